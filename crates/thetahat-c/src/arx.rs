@@ -137,77 +137,48 @@ pub(crate) trait Plant {
     fn estimate(&self) -> &dyn Estimate;
 }
 
-impl<const N: usize> Plant for ArxEstimator<N> {
-    fn measured(&mut self, output: Number) -> Result<Innovation, Error> {
-        Ok(self.measured(output)?.into())
-    }
+macro_rules! plant {
+    ($estimator:ident) => {
+        impl<const N: usize> Plant for $estimator<N> {
+            fn measured(&mut self, output: Number) -> Result<Innovation, Error> {
+                Ok(self.measured(output)?.into())
+            }
 
-    fn applied(&mut self, inputs: &[Number]) -> Result<(), Error> {
-        Ok(self.applied(inputs)?)
-    }
+            fn applied(&mut self, inputs: &[Number]) -> Result<(), Error> {
+                Ok(self.applied(inputs)?)
+            }
 
-    fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error> {
-        Ok(self.log_row(output, inputs)?.into())
-    }
+            fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error> {
+                Ok(self.log_row(output, inputs)?.into())
+            }
 
-    fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error> {
-        Ok(self.predict(inputs, outputs)?)
-    }
+            fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error> {
+                Ok(self.predict(inputs, outputs)?)
+            }
 
-    fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
-        let mut changed = self.clone().with_parameters(vector(parameters))?;
-        if let Some(fit) = fit {
-            changed = changed.with_covariance(fit.covariance()?)?;
-            changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
+            fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
+                let mut changed = self.clone().with_parameters(vector(parameters))?;
+                if let Some(fit) = fit {
+                    changed = changed.with_covariance(fit.covariance()?)?;
+                    changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
+                }
+                *self = changed;
+                Ok(())
+            }
+
+            fn set_adaptation(&mut self, on: bool) {
+                self.set_adaptation(on);
+            }
+
+            fn estimate(&self) -> &dyn Estimate {
+                self.estimator()
+            }
         }
-        *self = changed;
-        Ok(())
-    }
-
-    fn set_adaptation(&mut self, on: bool) {
-        self.set_adaptation(on);
-    }
-
-    fn estimate(&self) -> &dyn Estimate {
-        self.estimator()
-    }
+    };
 }
 
-impl<const N: usize> Plant for ArmaxEstimator<N> {
-    fn measured(&mut self, output: Number) -> Result<Innovation, Error> {
-        Ok(self.measured(output)?.into())
-    }
-
-    fn applied(&mut self, inputs: &[Number]) -> Result<(), Error> {
-        Ok(self.applied(inputs)?)
-    }
-
-    fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error> {
-        Ok(self.log_row(output, inputs)?.into())
-    }
-
-    fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error> {
-        Ok(self.predict(inputs, outputs)?)
-    }
-
-    fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
-        let mut changed = self.clone().with_parameters(vector(parameters))?;
-        if let Some(fit) = fit {
-            changed = changed.with_covariance(fit.covariance()?)?;
-            changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
-        }
-        *self = changed;
-        Ok(())
-    }
-
-    fn set_adaptation(&mut self, on: bool) {
-        self.set_adaptation(on);
-    }
-
-    fn estimate(&self) -> &dyn Estimate {
-        self.estimator()
-    }
-}
+plant!(ArxEstimator);
+plant!(ArmaxEstimator);
 
 fn init_arx<const N: usize>(place: Place<Arx>, model: &ArxModel, learning: &Learning) -> Made<Arx> {
     if model.nc > 0 {

@@ -153,20 +153,22 @@ fn a_sample_that_is_refused_changes_nothing() {
 /// What is too large in single precision is not in double.
 const TOO_LARGE_OR_NONE: Error = if cfg!(feature = "double") { Error::None } else { Error::TooLarge };
 
+const FIRST_ORDER: ArxModel = ArxModel {
+    na: 1,
+    inputs: 1,
+    input: [InputOrders { nb: 1, nk: 1 }; 4],
+    nc: 0,
+    constant: 0,
+    output_scale: 1.0,
+    input_scales: [1.0; 4],
+    noise_scale: 1.0,
+    gradient: 0,
+};
+
 #[test]
 fn orders_and_learning_are_checked() {
     let (mut memory, mut arx) = (Memory::new(), null_mut());
-    let model = ArxModel {
-        na: 1,
-        inputs: 1,
-        input: [InputOrders { nb: 1, nk: 1 }; 4],
-        nc: 0,
-        constant: 0,
-        output_scale: 1.0,
-        input_scales: [1.0; 4],
-        noise_scale: 1.0,
-        gradient: 0,
-    };
+    let model = FIRST_ORDER;
     let start = memory.start();
     let mut init = |size: &'static ArxSize, model: ArxModel, learning: Learning| {
         // SAFETY: all pointers are valid.
@@ -216,17 +218,7 @@ fn orders_and_learning_are_checked() {
 #[test]
 fn a_fit_is_checked_and_taken_whole() {
     let (mut memory, mut arx) = (Memory::new(), null_mut());
-    let model = ArxModel {
-        na: 1,
-        inputs: 0,
-        input: [InputOrders { nb: 0, nk: 0 }; 4],
-        nc: 1,
-        constant: 0,
-        output_scale: 1.0,
-        input_scales: [1.0; 4],
-        noise_scale: 1.0,
-        gradient: 0,
-    };
+    let model = ArxModel { inputs: 0, nc: 1, ..FIRST_ORDER };
     let start = memory.start();
     // SAFETY: all pointers are valid.
     let code =

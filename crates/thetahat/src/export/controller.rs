@@ -104,11 +104,7 @@ pub(super) fn program(controller: &Controller) -> Program {
         Statement::Let(reference, set_point.at(0) - *working),
         Statement::Let(y, measured.at(0) - *working),
         Statement::Let(wanted, gained() - s.at(0) * y + z.at(0)),
-        Statement::Choose {
-            condition: Condition::Missing(wanted - Value::from(wanted)),
-            then: Vec::new(),
-            otherwise: then,
-        },
+        Statement::unless_missing(wanted - Value::from(wanted), then),
         Statement::Let(said, latest.at(0) + *level),
     ];
     // A sum may be rounded to beyond a limit.
@@ -148,11 +144,7 @@ pub(super) fn program(controller: &Controller) -> Program {
         result: None,
         body: vec![
             Statement::Let(change, told.at(0) - *level - latest.at(0)),
-            Statement::Choose {
-                condition: Condition::Missing(change - Value::from(change)),
-                then: Vec::new(),
-                otherwise: then,
-            },
+            Statement::unless_missing(change - Value::from(change), then),
         ],
     };
     program.entries = vec![control, applied];

@@ -7,7 +7,7 @@
 //! (Ljung, System Identification, 2nd ed. 1999, section 5.4), each signal divided by its scale once.
 
 use super::map::evaluated;
-use super::program::{Array, Condition, Index, Program, Statement};
+use super::program::{Array, Index, Program, Statement};
 use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
@@ -60,13 +60,8 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
         body.extend(lines.take_outputs(&mut program, predicted));
         vec![signals.responds("step", FREE_RUN, body)]
     } else {
-        let mut update: Vec<Statement> = (0..outputs)
-            .map(|output| Statement::Choose {
-                condition: Condition::Missing(signals.measured.at(output)),
-                then: Vec::new(),
-                otherwise: vec![Statement::Store(predicted, output.into(), signals.output(&output.into()))],
-            })
-            .collect();
+        let mut update: Vec<Statement> =
+            (0..outputs).map(|output| signals.hold_output(predicted, &output.into())).collect();
         update.extend(lines.take_outputs(&mut program, predicted));
         vec![signals.responds("predict", PREDICTION, body), signals.updates(UPDATE, update)]
     };

@@ -199,6 +199,13 @@ pub(super) enum Statement {
     },
 }
 
+impl Statement {
+    /// What is done unless a number is missing.
+    pub(super) fn unless_missing(number: Value, done: Vec<Self>) -> Self {
+        Self::Choose { condition: Condition::Missing(number), then: Vec::new(), otherwise: done }
+    }
+}
+
 /// A map of a program.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Evaluated {

@@ -1,6 +1,6 @@
 //! What goes into a program and comes out of it, in the units of the channels.
 
-use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
+use super::program::{Array, Entry, Index, Kind, Program, Statement, Value};
 use crate::Error;
 use crate::model::{Model, Signal};
 
@@ -117,6 +117,11 @@ impl Signals {
         }
     }
 
+    /// Puts what was measured of an output, as a deviation, into its place: where it is missing what stands there stays.
+    pub(super) fn hold_output(&self, held: Array, place: &Index) -> Statement {
+        hold(self.measured.at(place.clone()), held, place.clone(), self.output(place))
+    }
+
     /// Says a deviation of an output in its own unit.
     pub(super) fn say(&self, place: &Index, deviation: impl Into<Value>) -> Statement {
         let deviation = deviation.into();
@@ -148,9 +153,5 @@ impl Signals {
 
 /// Puts a value into its place, unless what it is made of is missing.
 fn hold(given: Value, into: Array, at: Index, value: Value) -> Statement {
-    Statement::Choose {
-        condition: Condition::Missing(given),
-        then: Vec::new(),
-        otherwise: vec![Statement::Store(into, at, value)],
-    }
+    Statement::unless_missing(given, vec![Statement::Store(into, at, value)])
 }

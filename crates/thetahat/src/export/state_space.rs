@@ -10,7 +10,7 @@
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Variable};
+use super::program::{Array, Entry, Index, Kind, Program, Statement, Variable};
 use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
@@ -172,13 +172,7 @@ impl System {
     /// Takes what was measured; a prediction stays where it is missing.
     fn take_measured(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
         let Some(y) = self.y else { return Vec::new() };
-        program.repeat(self.outputs, |_, i| {
-            vec![Statement::Choose {
-                condition: Condition::Missing(signals.measured.at(i.clone())),
-                then: Vec::new(),
-                otherwise: vec![Statement::Store(y, i.clone(), signals.output(&i))],
-            }]
-        })
+        program.repeat(self.outputs, |_, i| vec![signals.hold_output(y, &i)])
     }
 
     fn predictor(&self, program: &mut Program, signals: &Signals) -> Vec<Entry> {

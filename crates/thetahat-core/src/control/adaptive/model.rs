@@ -92,6 +92,39 @@ pub trait Estimated<T: Real, P: Dimension + Dimension<Const<1>>>: Clone {
     }
 }
 
+/// What both models call by the same names.
+macro_rules! steps {
+    () => {
+        fn with_start(self, start: RlsStart) -> Result<Self, Error> {
+            self.with_start(start)
+        }
+
+        fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
+            self.measured(output)
+        }
+
+        fn applied(&mut self, input: T) -> Result<(), Error> {
+            self.applied(&[input])
+        }
+
+        fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error> {
+            self.predict(&[input], output)
+        }
+
+        fn set_adaptation(&mut self, on: bool) {
+            self.set_adaptation(on);
+        }
+
+        fn lags(&self) -> &Lags<T, P> {
+            self.lags()
+        }
+
+        fn estimator(&self) -> &RecursiveLeastSquares<T, P> {
+            self.estimator()
+        }
+    };
+}
+
 impl<T: Real, P: Dimension + Dimension<Const<1>>> Estimated<T, P> for RecursiveArx<T, P> {
     fn new(orders: &TunerOrders, scales: [T; 2], forgetting: Forgetting<T>) -> Result<Self, Error> {
         let TunerOrders { na, nb, nc, constant, .. } = *orders;
@@ -103,33 +136,7 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>> Estimated<T, P> for RecursiveA
         RecursiveArx::new(&orders, output, &[input], forgetting)
     }
 
-    fn with_start(self, start: RlsStart) -> Result<Self, Error> {
-        self.with_start(start)
-    }
-
-    fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.measured(output)
-    }
-
-    fn applied(&mut self, input: T) -> Result<(), Error> {
-        self.applied(&[input])
-    }
-
-    fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error> {
-        self.predict(&[input], output)
-    }
-
-    fn set_adaptation(&mut self, on: bool) {
-        self.set_adaptation(on);
-    }
-
-    fn lags(&self) -> &Lags<T, P> {
-        self.lags()
-    }
-
-    fn estimator(&self) -> &RecursiveLeastSquares<T, P> {
-        self.estimator()
-    }
+    steps!();
 
     fn c(&self) -> impl Iterator<Item = T> + Clone {
         core::iter::once(T::one())
@@ -146,33 +153,7 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>> Estimated<T, P> for RecursiveA
         RecursiveArmax::new(&orders, ArmaxMethod::PredictionError, output, &[input], noise, forgetting)
     }
 
-    fn with_start(self, start: RlsStart) -> Result<Self, Error> {
-        self.with_start(start)
-    }
-
-    fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.measured(output)
-    }
-
-    fn applied(&mut self, input: T) -> Result<(), Error> {
-        self.applied(&[input])
-    }
-
-    fn predict(&self, input: T, output: &mut [T]) -> Result<(), Error> {
-        self.predict(&[input], output)
-    }
-
-    fn set_adaptation(&mut self, on: bool) {
-        self.set_adaptation(on);
-    }
-
-    fn lags(&self) -> &Lags<T, P> {
-        self.lags()
-    }
-
-    fn estimator(&self) -> &RecursiveLeastSquares<T, P> {
-        self.estimator()
-    }
+    steps!();
 
     fn c(&self) -> impl Iterator<Item = T> + Clone {
         self.c()

@@ -8,7 +8,7 @@
 //! around one linearisation a sample, with noises that are independent of one another. The covariance is in the form of Bucy and Joseph (Filtering for
 //! Stochastic Processes, 1968), which rounding leaves positive.
 
-use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
+use super::super::program::{Array, Entry, Index, Kind, Program, Statement, Value};
 use super::super::signals::{PREDICTION, Signals};
 use super::{Run, multiplied};
 use crate::model::equations::GreyBox;
@@ -123,11 +123,7 @@ impl<'e> Kalman<'e> {
                 }));
                 row
             }));
-            vec![Statement::Choose {
-                condition: Condition::Missing(signals.measured.at(j.clone())),
-                then: Vec::new(),
-                otherwise: own,
-            }]
+            vec![Statement::unless_missing(signals.measured.at(j.clone()), own)]
         }));
         body.extend(
             program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), x.at(i.clone()) + moved.at(i))]),

@@ -51,30 +51,23 @@ pub(super) fn file(start: &Start, plan: &Plan, head: &Head) -> ExportedFile {
         start.orders.na,
         input_orders.join(", ")
     );
-    text += &format!(
-        "/// What the inputs are measured from.\npub const U_OFFSET: [{real}; {inputs}] = {};\n\n",
-        numbers(&start.offsets.inputs)
-    );
-    text += &format!(
-        "/// What the output is measured from.\npub const Y_OFFSET: {real} = {};\n\n",
-        writer.number(start.offsets.output)
-    );
-    text += &format!(
-        "/// The typical magnitudes of the inputs.\nconst U_SCALE: [{real}; {inputs}] = {};\n\n",
-        numbers(&start.scales.inputs)
-    );
-    text += &format!(
-        "/// That of the output.\nconst Y_SCALE: {real} = {};\n\n",
-        writer.number(start.scales.output)
-    );
-    text += &format!(
-        "/// The parameters of the fit.\npub const PARAMETERS: [{real}; {count}] = {};\n\n",
-        numbers(&start.parameters)
-    );
-    text += &format!(
-        "/// Their covariance over the noise variance, factored as `Covariance::factor` has it.\nconst FACTOR: [[{real}; {count}]; {count}] = [\n{}];\n\n",
-        rows.concat()
-    );
+    let several = |values: &[f64]| (format!("[{real}; {}]", values.len()), numbers(values));
+    let one = |value: f64| (real.to_owned(), writer.number(value));
+    let covariance = (format!("[[{real}; {count}]; {count}]"), format!("[\n{}]", rows.concat()));
+    for (doc, name, (kind, value)) in [
+        ("What the inputs are measured from.", "pub const U_OFFSET", several(&start.offsets.inputs)),
+        ("What the output is measured from.", "pub const Y_OFFSET", one(start.offsets.output)),
+        ("The typical magnitudes of the inputs.", "const U_SCALE", several(&start.scales.inputs)),
+        ("That of the output.", "const Y_SCALE", one(start.scales.output)),
+        ("The parameters of the fit.", "pub const PARAMETERS", several(&start.parameters)),
+        (
+            "Their covariance over the noise variance, factored as `Covariance::factor` has it.",
+            "const FACTOR",
+            covariance,
+        ),
+    ] {
+        text += &format!("/// {doc}\n{name}: {kind} = {value};\n\n");
+    }
     text += &format!(
         "/// The estimator of the core, of deviations from the offsets.\npub type Estimator = {kind}<{real}, Const<{count}>, Const<{delays}>>;\n\n"
     );

@@ -168,6 +168,27 @@ fn models_in_equations_say_what_the_library_does() {
     );
     folder.done("fit --grey motor.toml log.csv --time t --report r.json");
     goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
+    // One state and one output, of which no loop is made, and a step of the log in two.
+    folder.write(
+        "speed.toml",
+        "sample_time = 0.01
+         substeps = 2
+         [states]
+         speed = { start = 0, sd = 1 }
+         [inputs]
+         voltage = 'u'
+         [parameters]
+         gain = { start = 10, sd = 10, unknown = true }
+         [derivative]
+         speed = '10 * (gain * voltage - speed)'
+         [outputs]
+         speed = 'speed'
+         [noise]
+         process = { speed = 1 }
+         measurement = { speed = 1 }",
+    );
+    folder.done("fit --grey speed.toml log.csv --time t --report r.json");
+    goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
 }
 
 #[test]

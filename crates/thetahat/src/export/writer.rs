@@ -101,13 +101,14 @@ impl<'p> Writer<'p> {
             Statement::Repeat { counter, times, body } => {
                 self.open.push(*counter);
                 let name = self.counter(*counter);
-                let body = self.statements(body, &inner);
+                let written = self.statements(body, &inner);
                 self.open.pop();
                 let head = match self.language {
                     Language::C => format!("for (size_t {name} = 0U; {name} < {times}U; {name} += 1U)"),
-                    Language::Rust => format!("for {name} in 0..{times}"),
+                    Language::Rust if counts(body, *counter) => format!("for {name} in 0..{times}"),
+                    Language::Rust => format!("for _ in 0..{times}"),
                 };
-                writeln!(text, "{indent}{head} {{\n{body}{indent}}}")
+                writeln!(text, "{indent}{head} {{\n{written}{indent}}}")
             }
             Statement::Choose { condition, then, otherwise } => {
                 let (mut holds, mut then, mut otherwise) = (true, then, otherwise);
@@ -249,6 +250,37 @@ fn sets(statements: &[Statement], variable: Variable) -> bool {
         Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
         Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
     })
+}
+
+/// Whether statements say which turn it is.
+fn counts(statements: &[Statement], counter: Counter) -> bool {
+    let of = |index: &Index| index.terms.iter().any(|(own, _)| *own == counter);
+    statements.iter().any(|statement| match statement {
+        Statement::Let(_, value) | Statement::Set(_, value) => reads(value, &of),
+        Statement::Store(_, index, value) => of(index) || reads(value, &of),
+        Statement::Repeat { body, .. } => counts(body, counter),
+        Statement::Choose { condition, then, otherwise } => {
+            let chosen = match condition {
+                Condition::Missing(value) => reads(value, &of),
+                Condition::Less(one, other) | Condition::AtMost(one, other) => {
+                    reads(one, &of) || reads(other, &of)
+                }
+            };
+            chosen || counts(then, counter) || counts(otherwise, counter)
+        }
+        Statement::Evaluate { .. } => false,
+    })
+}
+
+/// Whether a number is one of a place in an array for which `of` holds, or is made of one.
+fn reads(value: &Value, of: &impl Fn(&Index) -> bool) -> bool {
+    match value {
+        Value::Number(_) | Value::Variable(_) => false,
+        Value::At(_, index) => of(index),
+        Value::Negative(own) => reads(own, of),
+        Value::Binary(_, one, other) => reads(one, of) || reads(other, of),
+        Value::Call(_, arguments) => arguments.iter().any(|own| reads(own, of)),
+    }
 }
 
 /// What C and Rust call a function.

@@ -77,7 +77,8 @@ impl<'e> Kalman<'e> {
         let Self { run, p, work, said, h, gain, moved, r, .. } = *self;
         let (n, x) = (run.states, run.x);
         let mut body = program.repeat(n, |_, i| vec![Statement::Store(moved, i, 0.0.into())]);
-        let [error, variance, sum] = ["error", "variance", "total"].map(|name| program.variable(name));
+        let [error, variance, sum, share] =
+            ["error", "variance", "total", "share"].map(|name| program.variable(name));
         body.extend(program.repeat(run.outputs, |program, j| {
             let measured = signals.output(&j) - said.at(j.clone());
             let of_h = |i: &Index| h.at(j.entry(n, i));
@@ -111,15 +112,13 @@ impl<'e> Kalman<'e> {
                 ]
             }));
             own.extend(program.repeat(n, |program, i| {
-                let mut row = vec![Statement::Let(sum, -(gain.at(i.clone()) * r.at(j.clone())))];
-                row.extend(
-                    program.repeat(n, |_, k| {
-                        vec![Statement::Set(sum, sum + work.at(i.entry(n, &k)) * of_h(&k))]
-                    }),
-                );
+                let mut row = vec![Statement::Let(share, -(gain.at(i.clone()) * r.at(j.clone())))];
+                row.extend(program.repeat(n, |_, k| {
+                    vec![Statement::Set(share, share + work.at(i.entry(n, &k)) * of_h(&k))]
+                }));
                 row.extend(program.repeat(n, |_, k| {
                     let entry = i.entry(n, &k);
-                    vec![Statement::Store(p, entry.clone(), work.at(entry) - Value::from(sum) * gain.at(k))]
+                    vec![Statement::Store(p, entry.clone(), work.at(entry) - Value::from(share) * gain.at(k))]
                 }));
                 row
             }));

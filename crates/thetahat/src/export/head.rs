@@ -59,7 +59,7 @@ impl Head {
             );
         }
         lines.push(match plan.precision {
-            Precision::F64 => "The order of operations is the library's: compiled without contraction of a * b + c (-ffp-contract=off) the bits are.".to_owned(),
+            Precision::F64 => "Compiled without contraction of a * b + c (-ffp-contract=off), its bits are those of the test vector.".to_owned(),
             Precision::F32 => "Constants are the nearest in single precision.".to_owned(),
         });
         Ok(Self { what, lines })

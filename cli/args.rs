@@ -4,6 +4,7 @@ mod closed_loop;
 mod control;
 mod convert;
 mod design;
+mod each;
 mod export;
 mod files;
 mod filter;
@@ -27,6 +28,7 @@ pub(crate) use closed_loop::ClosedLoopArguments;
 pub(crate) use control::{ControlArguments, IntegratorArgument};
 pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;
+pub(crate) use each::EachArguments;
 pub(crate) use export::ExportArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::{

@@ -7,6 +7,7 @@ mod control;
 mod convert;
 pub(crate) mod demo;
 mod design;
+mod each;
 mod experiments;
 mod export;
 mod filter;

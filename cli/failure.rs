@@ -44,6 +44,27 @@ impl Failure {
         self.kind
     }
 
+    /// The exit code of a program that ends so.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self.kind {
+            Kind::Closed => 0,
+            Kind::Usage => 2,
+            Kind::Data => 3,
+            Kind::Undetermined => 4,
+            Kind::Io(_) => 5,
+            Kind::Unmet => 6,
+            Kind::Alarm => 7,
+            Kind::Interrupted => 130,
+        }
+    }
+
+    /// What a row of many says of one of them, as the end of all.
+    pub(crate) fn of_exit_code(code: u64, message: impl AsRef<str>) -> Self {
+        let kinds = [Kind::Usage, Kind::Undetermined, Kind::Io(io::ErrorKind::Other), Kind::Unmet];
+        let kind = kinds.into_iter().find(|kind| u64::from(Self::new(*kind, "").exit_code()) == code);
+        Self::new(kind.unwrap_or(Kind::Data), message)
+    }
+
     /// What is wrong and what to do, in one line.
     pub fn message(&self) -> &str {
         &self.message

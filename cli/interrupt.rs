@@ -43,8 +43,8 @@ struct State {
     waker: Option<Waker>,
     /// The exit code of whoever asked last.
     code: u8,
-    /// The file that is being written, under its passing name.
-    unfinished: Option<PathBuf>,
+    /// The files that are being written, under their passing names.
+    unfinished: Vec<PathBuf>,
     /// Whether something is written already.
     written: bool,
     /// What stands on the terminal.
@@ -58,7 +58,7 @@ impl State {
             asked: false,
             waker: None,
             code: INTERRUPTED,
-            unfinished: None,
+            unfinished: Vec::new(),
             written: false,
             bar: None,
         }
@@ -108,7 +108,7 @@ fn asked_by(code: u8) {
     if let Some(bar) = &state.bar {
         bar.finish_and_clear();
     }
-    if let Some(path) = &state.unfinished {
+    for path in &state.unfinished {
         // What is gone already need not be removed.
         let _ = fs::remove_file(path);
     }
@@ -171,15 +171,18 @@ pub(crate) fn writing() {
 pub(crate) fn begin(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<NamedTempFile> {
     let mut state = state();
     let file = make()?;
-    state.unfinished = Some(file.path().to_owned());
+    state.unfinished.push(file.path().to_owned());
     Ok(file)
 }
 
 /// Moves the file to its place.
-pub(crate) fn finish<T>(moving: impl FnOnce() -> Result<T, io::Error>) -> Result<T, io::Error> {
+pub(crate) fn finish<T>(
+    file: NamedTempFile,
+    moving: impl FnOnce(NamedTempFile) -> Result<T, io::Error>,
+) -> Result<T, io::Error> {
     let mut state = state();
-    state.unfinished = None;
-    let moved = moving()?;
+    state.unfinished.retain(|path| path != file.path());
+    let moved = moving(file)?;
     state.written = true;
     Ok(moved)
 }

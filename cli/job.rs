@@ -17,7 +17,7 @@ mod step;
 mod track;
 mod validate;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use thetahat::data::{Interpolation, Resample, Rows};
@@ -66,6 +66,17 @@ pub(crate) enum Clock {
     Fixed(f64),
     /// Not given.
     Unknown,
+}
+
+/// The one log of a verb that takes each by itself.
+pub(crate) fn only<'p>(verb: &str, logs: &'p [PathBuf]) -> Result<&'p Path, Failure> {
+    match logs {
+        [log] => Ok(log),
+        several => Err(Failure::usage(format!(
+            "{verb} takes one log, and {} are named; --each --table FILE takes each by itself",
+            several.len()
+        ))),
+    }
 }
 
 impl LogJob {

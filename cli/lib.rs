@@ -77,24 +77,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
 
 /// Says on standard error why the program ends, and gives its exit code.
 fn end(failure: &Failure) -> u8 {
-    let code = match failure.kind() {
-        Kind::Closed => return 0,
+    match failure.kind() {
+        Kind::Closed => {}
         Kind::Interrupted => {
             say(interrupt::message(interrupt::has_written()));
+            // That of the signal.
             return interrupt::exit_code();
         }
-        Kind::Usage => 2,
-        Kind::Data => 3,
-        Kind::Undetermined => 4,
-        Kind::Io(_) => 5,
-        Kind::Unmet => 6,
-        Kind::Alarm => {
-            tell(failure.message());
-            return 7;
-        }
-    };
-    tell(&format!("\x1b[1;31merror:\x1b[0m {}", failure.message()));
-    code
+        Kind::Alarm => tell(failure.message()),
+        _ => tell(&format!("\x1b[1;31merror:\x1b[0m {}", failure.message())),
+    }
+    failure.exit_code()
 }
 
 /// Prints what the syntax of a command line says. Nobody is left to tell if that fails.

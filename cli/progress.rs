@@ -2,6 +2,7 @@
 
 use std::io::IsTerminal;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,6 +15,9 @@ use crate::interrupt;
 const PATIENCE: Duration = Duration::from_secs(1);
 /// How often a spinner turns.
 const TURN: Duration = Duration::from_millis(120);
+
+/// Whether what is done many times over has the terminal for its own bar.
+static TAKEN: AtomicBool = AtomicBool::new(false);
 
 /// A bar that appears when patience ends, and goes when it is dropped.
 #[derive(Debug)]
@@ -68,7 +72,9 @@ impl Reading {
             Some(total) => (ProgressBar::new(total), "reading {wide_bar} {bytes}/{total_bytes} {eta}"),
             None => (ProgressBar::new_spinner(), "reading {spinner} {bytes}"),
         };
-        if let Some(bar) = self.0.due(make) {
+        if !TAKEN.load(Ordering::Relaxed)
+            && let Some(bar) = self.0.due(make)
+        {
             bar.set_position(read);
         }
     }
@@ -89,12 +95,47 @@ impl Searching {
             bar.enable_steady_tick(TURN);
             (bar, "searching {spinner} {msg} {elapsed}")
         };
-        if let Some(bar) = self.0.due(make) {
+        if !TAKEN.load(Ordering::Relaxed)
+            && let Some(bar) = self.0.due(make)
+        {
             bar.set_message(format!(
                 "iteration {}, cost {}",
                 progress.iteration,
                 scientific(progress.cost, 6)
             ));
         }
+    }
+}
+
+/// How many of many logs are done. It has the terminal for itself.
+#[derive(Debug)]
+pub(crate) struct Counting {
+    bar: Bar,
+    logs: usize,
+    done: AtomicUsize,
+    failed: AtomicUsize,
+}
+
+impl Counting {
+    pub(crate) fn new(logs: usize) -> Self {
+        TAKEN.store(true, Ordering::Relaxed);
+        Self { bar: Bar::new(), logs, done: AtomicUsize::new(0), failed: AtomicUsize::new(0) }
+    }
+
+    /// One more, well or not.
+    pub(crate) fn done(&self, failed: bool) {
+        let failures = self.failed.fetch_add(failed.into(), Ordering::Relaxed) + usize::from(failed);
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        let make = || (ProgressBar::new(self.logs as u64), "{wide_bar} {pos}/{len} logs, {msg} {eta}");
+        if let Some(bar) = self.bar.due(make) {
+            bar.set_message(format!("{failures} failed"));
+            bar.set_position(done as u64);
+        }
+    }
+}
+
+impl Drop for Counting {
+    fn drop(&mut self) {
+        TAKEN.store(false, Ordering::Relaxed);
     }
 }

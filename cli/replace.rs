@@ -29,6 +29,14 @@ pub(crate) fn replace(
     path: &Path,
     fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> Result<(), Failure> {
+    if let Ok(target) = behind_links(path) {
+        sweep(folder(&target));
+    }
+    put(path, fill)
+}
+
+/// The same in a folder that was [swept](sweep).
+pub(crate) fn put(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
     let target = behind_links(path).map_err(failed)?;
     let existing = existing(&target).map_err(failed)?;
@@ -37,9 +45,8 @@ pub(crate) fn replace(
         let mut file = BufWriter::new(OpenOptions::new().write(true).open(&target).map_err(failed)?);
         return fill(&mut file).and_then(|()| file.flush()).map_err(failed);
     }
-    sweep(folder(&target));
     let file = filled(&target, existing.as_ref(), fill).map_err(failed)?;
-    interrupt::finish(|| file.persist(&target).map_err(|error| error.error)).map_err(failed)?;
+    interrupt::finish(file, |file| file.persist(&target).map_err(|error| error.error)).map_err(failed)?;
     Ok(())
 }
 
@@ -99,7 +106,7 @@ impl Held {
         let new = filled(target, existing.as_ref(), |new| new.write_all(bytes)).map_err(failed)?;
         // Windows does not replace what is open.
         let is_first = if cfg!(windows) { file.take().is_none() } else { file.is_none() };
-        let moved = interrupt::finish(|| {
+        let moved = interrupt::finish(new, |new| {
             let moved = if is_first { new.persist_noclobber(&*target) } else { new.persist(&*target) };
             moved.map_err(|error| error.error)
         });
@@ -199,7 +206,7 @@ fn take_over(file: &File, existing: &fs::Metadata) -> io::Result<()> {
 }
 
 /// Removes the passing files that runs left in a folder when they were killed.
-fn sweep(folder: &Path) {
+pub(crate) fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if !is_passing(&entry.file_name()) || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;

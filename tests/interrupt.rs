@@ -192,3 +192,27 @@ fn a_job_that_ignores_interrupts_goes_on() {
     command.current_dir(folder.path(""));
     assert_eq!(pressed_in_its_search(command).code, 0);
 }
+
+#[test]
+fn a_run_over_many_logs_goes_on_after_it_was_interrupted() {
+    let folder = Folder::new();
+    let names: Vec<String> = (0..5).map(|index| format!("{index}.csv")).collect();
+    names[..4].iter().for_each(|name| folder.write(name, "u,y\n1,2\n"));
+    folder.write(&names[4], plain_log());
+    let line =
+        format!("fit --each {} {ENDLESS} --threads 1 --table fleet.csv --reports out", names.join(" "));
+    let child = started(folder.command(&line));
+    let journal = || folder.read("out/journal.jsonl").lines().count();
+    let began = Instant::now();
+    while journal() < 4 && began.elapsed() < HANGS {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    // The next log is in its search, or about to be.
+    press(&child);
+    let run = ended(child);
+    assert_eq!((run.code, run.stdout.as_str()), (130, ""), "{}", run.stderr);
+    assert!(!folder.names().contains(&"fleet.csv".to_owned()));
+    folder.write(&names[4], "u,y\n1,2\n");
+    let run = folder.run(&line);
+    assert!(run.stdout.contains("5 rows, 0 of them without a failure; 4 as in an earlier run"), "{run:?}");
+}

@@ -18,6 +18,7 @@ mod csv_dialects;
 mod demo_and_help;
 mod design;
 mod draws;
+mod each;
 mod equations;
 mod export;
 mod filter;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Command, PredictArguments, SimulateArguments};
+use super::{Command, EvaluationArguments, PredictArguments, SimulateArguments};
 use crate::files::Files;
 
 impl Command {
@@ -13,11 +13,14 @@ impl Command {
         match self {
             Self::Fit(fit) => {
                 read.extend(fit.grey.iter().chain(&fit.logs).cloned());
-                written.extend(fit.report.iter().chain(&fit.html).cloned());
+                read.extend(fit.each.list.iter().cloned());
+                written.extend(fit.report.iter().chain(&fit.html).chain(&fit.each.table).cloned());
             }
             Self::Inspect(inspect) => {
-                read.push(inspect.path.clone());
-                written.extend([&inspect.out].into_iter().chain(&inspect.html).cloned());
+                read.extend(inspect.logs.iter().chain(&inspect.each.list).cloned());
+                // With a table, nothing else is written.
+                let out = Some(&inspect.out).filter(|_| !inspect.each.each);
+                written.extend(out.into_iter().chain(&inspect.html).chain(&inspect.each.table).cloned());
             }
             Self::Spectrum(spectrum) => {
                 read.extend(spectrum.paths.iter().cloned());
@@ -32,8 +35,11 @@ impl Command {
                 written.extend([&respond.out].into_iter().chain(draws_file).cloned());
             }
             Self::Validate(validate) => {
-                read.extend([validate.report.clone(), validate.path.clone()]);
-                written.extend(validate.evaluation.out.iter().chain(&validate.evaluation.html).cloned());
+                read.extend(
+                    [&validate.report].into_iter().chain(&validate.logs).chain(&validate.each.list).cloned(),
+                );
+                let EvaluationArguments { out, html, .. } = &validate.evaluation;
+                written.extend(out.iter().chain(html).chain(&validate.each.table).cloned());
             }
             Self::Compare(compare) => {
                 read.extend(compare.reports.iter().chain([&compare.path]).chain(&compare.over).cloned());

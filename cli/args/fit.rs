@@ -6,12 +6,12 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{ArgGroup, Args, ValueEnum};
 use thetahat::select::Select;
 
-use super::{ClockArguments, FormatArgument, LogArguments, Names};
+use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, Names};
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not (- for standard input)
-    #[arg(value_name = "LOG", required_unless_present = "from")]
+    #[arg(value_name = "LOG", required_unless_present_any = ["from", "list"])]
     pub(crate) logs: Vec<PathBuf>,
     /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure or
     /// --np
@@ -19,7 +19,7 @@ pub(crate) struct FitArguments {
         long,
         value_name = "RESPONSE",
         requires = "continuous",
-        conflicts_with_all = ["logs", "output", "estimate", "validate", "split", "offset", "trend", "initial", "html", "ClockArguments", "LogArguments"]
+        conflicts_with_all = ["logs", "each", "output", "estimate", "validate", "split", "offset", "trend", "initial", "html", "ClockArguments", "LogArguments"]
     )]
     pub(crate) from: Option<PathBuf>,
 
@@ -73,14 +73,16 @@ pub(crate) struct FitArguments {
     pub(crate) criterion: CriterionArguments,
 
     /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) html: Option<PathBuf>,
     /// Write the JSON report to a file (- for standard output, instead of the table)
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) report: Option<PathBuf>,
     /// What to print: a table for people, or the JSON report
-    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output", conflicts_with = "each")]
     pub(crate) format: FormatArgument,
+    #[command(flatten)]
+    pub(crate) each: EachArguments,
 
     #[command(flatten)]
     pub(crate) clock: ClockArguments,
@@ -89,7 +91,7 @@ pub(crate) struct FitArguments {
 }
 
 /// Which model, and what its estimate starts from.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(group(
     ArgGroup::new("continuous").conflicts_with_all([
         "na", "nb", "nc", "nd", "nf", "nk", "taps", "kernel", "method", "likelihood", "focus", "constant", "detrend", "prefilter", "path",
@@ -175,7 +177,7 @@ pub(crate) struct ModelArguments {
 }
 
 /// A state-space model.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "State space (--model ss)")]
 pub(crate) struct StateSpaceArguments {
     /// States, or a range among which the least MDL chooses [default: 1..20]
@@ -211,7 +213,7 @@ pub(crate) enum FeedthroughArgument {
 }
 
 /// A nonlinear ARX model.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Nonlinear ARX")]
 pub(crate) struct NarxArguments {
     /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains most of what is left
@@ -326,7 +328,7 @@ impl MapArgument {
 }
 
 /// How to choose, where orders are ranges or are not given.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Choice (orders that are ranges, or not given)")]
 pub(crate) struct ChoiceArguments {
     /// Which models of the ranges are tried [default: all]
@@ -342,7 +344,7 @@ pub(crate) struct ChoiceArguments {
 }
 
 /// How to search, where the model is not linear in its parameters.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Search (models with C, D or F, in equations, and trained)")]
 pub(crate) struct SearchArguments {
     /// How steps are chosen [default: lm]
@@ -369,7 +371,7 @@ pub(crate) struct SearchArguments {
 }
 
 /// What to make small; and what to respect, where the model is linear in its parameters.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Criterion (all but --norm for models without C, D and F)")]
 pub(crate) struct CriterionArguments {
     /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber[:K], of squares

@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ClockArguments, FormatArgument, LogArguments, Names};
+use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, Names};
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct InspectArguments {
     /// The log: a CSV file, gzip-compressed or not (- for standard input)
-    #[arg(value_name = "LOG")]
-    pub(crate) path: PathBuf,
+    #[arg(value_name = "LOG", required_unless_present = "list")]
+    pub(crate) logs: Vec<PathBuf>,
 
     /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …, if they are there]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
@@ -20,7 +20,7 @@ pub(crate) struct InspectArguments {
     pub(crate) output: Option<String>,
 
     /// What to write: a table for people, or the JSON document
-    #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
+    #[arg(long, value_enum, default_value = "table", help_heading = "Output", conflicts_with = "each")]
     pub(crate) format: FormatArgument,
     /// Write it to a file instead of standard output
     #[arg(
@@ -29,12 +29,15 @@ pub(crate) struct InspectArguments {
         value_name = "FILE",
         default_value = "-",
         hide_default_value = true,
-        help_heading = "Output"
+        help_heading = "Output",
+        conflicts_with = "each"
     )]
     pub(crate) out: PathBuf,
     /// Write a page with charts to a file too
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) html: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) each: EachArguments,
 
     #[command(flatten)]
     pub(crate) clock: ClockArguments,

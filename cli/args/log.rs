@@ -7,7 +7,7 @@ use clap::Args;
 use crate::table;
 
 /// The clock of a log that is read as it comes.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Clock")]
 pub(crate) struct LiveClockArguments {
     /// The column of times: seconds, or ISO 8601 dates
@@ -41,7 +41,7 @@ impl Names {
 }
 
 /// How a log is written.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct LogArguments {
     /// What separates fields: a character, or tab [default: recognised among comma, semicolon and tab]
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
@@ -73,7 +73,7 @@ pub(crate) struct LogArguments {
 }
 
 /// The log's clock.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct ClockArguments {
     /// The column of times: seconds, or ISO 8601 dates
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]

@@ -4,26 +4,28 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{ClockArguments, FormatArgument, LogArguments};
+use super::{ClockArguments, EachArguments, FormatArgument, LogArguments};
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
     /// The log: a CSV file, gzip-compressed or not (- for standard input)
-    #[arg(value_name = "LOG")]
-    pub(crate) path: PathBuf,
+    #[arg(value_name = "LOG", required_unless_present = "list")]
+    pub(crate) logs: Vec<PathBuf>,
     /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
     /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E, largest-error@K<=E,
     /// coverage>=P (of the 95 % intervals); exit code 6 if it does not
     #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
     pub(crate) require: Vec<String>,
     #[command(flatten)]
+    pub(crate) each: EachArguments,
+    #[command(flatten)]
     pub(crate) evaluation: EvaluationArguments,
 }
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct CompareArguments {
     /// The reports that fit wrote (- for standard input)
     #[arg(value_name = "REPORT", required = true, num_args = 1..)]
@@ -39,7 +41,7 @@ pub(crate) struct CompareArguments {
 }
 
 /// What validate and compare share.
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct EvaluationArguments {
     /// Rows to validate on, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]

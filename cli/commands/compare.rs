@@ -3,6 +3,7 @@
 use thetahat::Document;
 use thetahat::report::{Report, Validated, compare as compared, comparison_page};
 
+use super::search::Telling;
 use super::validate::{loaded, one, print};
 use super::{stored, summary};
 use crate::args::CompareArguments;
@@ -14,11 +15,12 @@ use crate::wrap::stdout_width;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
-    let read: Vec<_> = arguments.reports.iter().chain([&arguments.path]).chain(&arguments.over).collect();
+    let read: Vec<_> =
+        arguments.reports.iter().chain([&arguments.path]).chain(&arguments.over).cloned().collect();
     let job = EvaluationJob::resolve(evaluation, &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
-    let loaded = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>())?;
+    let loaded = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>(), &Telling::Aloud)?;
     let each = arguments.reports.iter().zip(&reports);
     let each =
         each.map(|(path, report)| one(path, report, &loaded, &job.plan).map_err(|failure| failure.of(path)));

@@ -1,6 +1,7 @@
 //! `thetahat fit`: from logs to a model and its report.
 
-use std::path::Path;
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
 
 use thetahat::Document;
 use thetahat::data::{Log, Rows, Source};
@@ -8,10 +9,11 @@ use thetahat::report::{
     Report, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored, validate,
 };
 
+use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
-use super::search::{Identified, watched};
-use super::{grey_box, narx, process, state_space, summary};
-use crate::args::{FitArguments, FormatArgument};
+use super::search::{Identified, Telling};
+use super::{grey_box, narx, process, state_space, stored, summary};
+use crate::args::{EachArguments, FitArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
 use crate::log;
@@ -20,21 +22,11 @@ use crate::output;
 use crate::wrap::stdout_width;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
-    check_linear(&arguments.narx)?;
+    if arguments.each.each {
+        return each(&arguments.each, &arguments.logs, &of_many(arguments)?, |log| one(arguments, log));
+    }
     let outputs = [&arguments.report, &arguments.html];
-    let Identified { report, log, sources } = match &arguments.grey {
-        Some(model) => grey_box::found(&GreyBoxJob::resolve(arguments, model)?)?,
-        None => match arguments.narx.narx {
-            Some(map) => narx::found(&NarxJob::resolve(arguments, map)?)?,
-            None => match ProcessJob::resolve(arguments)? {
-                Some(job) => process::found(&job)?,
-                None => match StateSpaceJob::resolve(arguments, false)? {
-                    Some(job) => state_space::found(&job)?,
-                    None => found(&FitJob::resolve(arguments)?, arguments.html.is_some())?,
-                },
-            },
-        },
-    };
+    let Identified { report, log, sources } = resolved(arguments)?.found(&Telling::Aloud)?;
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
     let page =
         arguments.html.as_ref().zip(log).map(|(_, log)| page(&report, &log, &sources, line)).transpose()?;
@@ -55,16 +47,81 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     }
 }
 
-/// Reads the logs and fits the model.
-fn found(job: &FitJob, keeps_log: bool) -> Result<Identified, Failure> {
+/// A fit, resolved: what model, and how it is fitted.
+enum Resolved {
+    GreyBox(GreyBoxJob),
+    Narx(NarxJob),
+    Process(Box<ProcessJob>),
+    StateSpace(Box<StateSpaceJob>),
+    Polynomial {
+        job: Box<FitJob>,
+        /// Whether the log is wanted afterwards.
+        keeps_log: bool,
+    },
+}
+
+fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
+    check_linear(&arguments.narx)?;
+    if let Some(model) = &arguments.grey {
+        return Ok(Resolved::GreyBox(GreyBoxJob::resolve(arguments, model)?));
+    }
+    if let Some(map) = arguments.narx.narx {
+        return Ok(Resolved::Narx(NarxJob::resolve(arguments, map)?));
+    }
+    if let Some(job) = ProcessJob::resolve(arguments)? {
+        return Ok(Resolved::Process(Box::new(job)));
+    }
+    if let Some(job) = StateSpaceJob::resolve(arguments, false)? {
+        return Ok(Resolved::StateSpace(Box::new(job)));
+    }
+    let job = FitJob::resolve(arguments)?;
     job.check_output()?;
+    Ok(Resolved::Polynomial { job: Box::new(job), keeps_log: arguments.html.is_some() })
+}
+
+impl Resolved {
+    /// Reads the logs and fits the model.
+    fn found(&self, telling: &Telling) -> Result<Identified, Failure> {
+        match self {
+            Self::GreyBox(job) => grey_box::found(job, telling),
+            Self::Narx(job) => narx::found(job, telling),
+            Self::Process(job) => process::found(job, telling),
+            Self::StateSpace(job) => state_space::found(job, telling),
+            Self::Polynomial { job, keeps_log } => found(job, *keeps_log, telling),
+        }
+    }
+}
+
+/// Reads the logs and fits the model.
+fn found(job: &FitJob, keeps_log: bool, telling: &Telling) -> Result<Identified, Failure> {
     let Experiments { log, sources, channels, words } = experiments(job, false)?;
-    words.iter().for_each(|word| warn(word));
+    words.iter().for_each(|word| telling.warn(word));
     let kept = keeps_log.then(|| log.clone());
     let (inputs, output) = channels.single();
     let plan = job.plan(inputs, output)?;
-    let report = watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
+    let report = telling.watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
     Ok(Identified { report: report.map_err(log::failure(&sources))?, log: kept, sources })
+}
+
+/// What fits of many logs have in common, in words that differ where they do: the options, and a model in equations.
+fn of_many(arguments: &FitArguments) -> Result<String, Failure> {
+    let own = FitArguments {
+        logs: vec![PathBuf::from("log")],
+        each: EachArguments::default(),
+        ..arguments.clone()
+    };
+    // What is wrong with the options is so with all logs.
+    resolved(&own)?;
+    let equations = arguments.grey.as_ref().map(|model| stored::text(model)).transpose()?;
+    Ok(format!("fit {own:?} {equations:?}"))
+}
+
+/// Fits a model to one log of many.
+fn one(arguments: &FitArguments, log: &Path) -> Result<Done, Failure> {
+    let own = FitArguments { logs: vec![log.to_owned()], ..arguments.clone() };
+    let telling = Telling::Kept(RefCell::default());
+    let Identified { report, .. } = resolved(&own)?.found(&telling)?;
+    Done::new(&report, report.row(), telling.kept(), &report.warnings)
 }
 
 /// The page of a fit, with a validation of each part of the log.
@@ -83,5 +140,6 @@ fn page(report: &Report, log: &Log, sources: &[Source], line: &str) -> Result<St
 
 /// Reads the logs and fits the model.
 pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
-    Ok(found(job, false)?.report)
+    job.check_output()?;
+    Ok(found(job, false, &Telling::Aloud)?.report)
 }

@@ -8,9 +8,10 @@ use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
 
+use super::each::{Done, each};
 use super::experiments::usual_inputs;
 use super::summary;
-use crate::args::{FormatArgument, InspectArguments};
+use crate::args::{EachArguments, FormatArgument, InspectArguments};
 use crate::failure::Failure;
 use crate::job::{Clock, InspectJob};
 use crate::log::{self, Recorded};
@@ -19,6 +20,9 @@ use crate::table::Reader;
 use crate::wrap::{WIDTH, stdout_width};
 
 pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {
+    if arguments.each.each {
+        return each(&arguments.each, &arguments.logs, &of_many(arguments)?, |log| one(arguments, log));
+    }
     let job = InspectJob::resolve(arguments)?;
     let (inspection, recording) = inspected(&job, arguments)?;
     if let (Some(path), Some(Recording { channels, times })) = (&arguments.html, recording) {
@@ -37,6 +41,26 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
         FormatArgument::Table => summary::inspection(&inspection, width),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+}
+
+/// What inspections of many logs have in common, in words that differ where they do.
+fn of_many(arguments: &InspectArguments) -> Result<String, Failure> {
+    let own = of_log(arguments, Path::new("log"));
+    // What is wrong with the options is so with all logs.
+    InspectJob::resolve(&own)?;
+    Ok(format!("inspect {own:?}"))
+}
+
+/// The same inspection of one log.
+fn of_log(arguments: &InspectArguments, log: &Path) -> InspectArguments {
+    InspectArguments { logs: vec![log.to_owned()], each: EachArguments::default(), ..arguments.clone() }
+}
+
+/// Inspects one log of many.
+fn one(arguments: &InspectArguments, log: &Path) -> Result<Done, Failure> {
+    let own = of_log(arguments, log);
+    let (inspection, _) = inspected(&InspectJob::resolve(&own)?, &own)?;
+    Done::new(&inspection, inspection.row(), Vec::new(), &inspection.warnings)
 }
 
 /// Reads the log and inspects it. What was read is there for a page, if one was asked for.

@@ -3,20 +3,20 @@
 use thetahat::report::fit_nonlinear_arx_monitored;
 
 use super::experiments::{Wanted, read};
-use super::search::{Identified, watched};
+use super::search::{Identified, Telling};
 use crate::failure::Failure;
 use crate::job::NarxJob;
 use crate::log;
-use crate::messages::warn;
 
 /// Reads the logs and fits the model.
-pub(super) fn found(job: &NarxJob) -> Result<Identified, Failure> {
+pub(super) fn found(job: &NarxJob, telling: &Telling) -> Result<Identified, Failure> {
     let wanted =
         Wanted { inputs: job.inputs.as_deref(), outputs: &job.outputs, driven: job.driven, none: "--nu 0" };
     let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
-    found.words.iter().for_each(|word| warn(word));
+    found.words.iter().for_each(|word| telling.warn(word));
     let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
-    let report = watched(|monitor| fit_nonlinear_arx_monitored(&found.log, &found.sources, &plan, monitor))?;
+    let report =
+        telling.watched(|monitor| fit_nonlinear_arx_monitored(&found.log, &found.sources, &plan, monitor))?;
     Ok(Identified {
         report: report.map_err(log::failure(&found.sources))?,
         log: Some(found.log),

@@ -1,14 +1,19 @@
 //! `thetahat validate`: how a stored model does on a log, and whether it is good enough.
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use thetahat::Document;
-use thetahat::report::{Report, Validated, ValidationPlan, validate as validated, validation_page};
+use thetahat::report::{
+    Report, Requirement, Validated, Validation, ValidationPlan, validate as validated, validation_page,
+};
 
+use super::each::{Done, each};
+use super::search::Telling;
 use super::{stored, summary};
-use crate::args::{EvaluationArguments, FormatArgument, ValidateArguments};
+use crate::args::{EachArguments, EvaluationArguments, FormatArgument, ValidateArguments};
 use crate::failure::Failure;
-use crate::job::EvaluationJob;
+use crate::job::{EvaluationJob, only};
 use crate::log::{self, Clocks, Loaded};
 use crate::messages::warn;
 use crate::output;
@@ -16,13 +21,21 @@ use crate::wrap::stdout_width;
 
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
-    let mut job = EvaluationJob::resolve(evaluation, &[&arguments.report, &arguments.path])?;
+    let read = [std::slice::from_ref(&arguments.report), &arguments.logs].concat();
+    let mut job = EvaluationJob::resolve(evaluation, &read)?;
     let requirements = job.requirements(&arguments.require)?;
+    let log = (!arguments.each.each).then(|| only("validate", &arguments.logs)).transpose()?;
     let report = stored::report(&arguments.report)?;
     let refused = |error| Failure::option(&error);
     requirements.iter().try_for_each(|requirement| requirement.check(&report)).map_err(refused)?;
+    let Some(log) = log else {
+        let common = of_many(arguments, &report)?;
+        return each(&arguments.each, &arguments.logs, &common, |log| {
+            one_of_many(arguments, &report, &job, &requirements, log)
+        });
+    };
 
-    let loaded = loaded(&arguments.path, &job, &[&report])?;
+    let loaded = loaded(log, &job, &[&report], &Telling::Aloud)?;
     let found = one(&arguments.report, &report, &loaded, &job.plan)?;
     let validation = &found.validation;
     let json = validation.to_json().map_err(|error| Failure::data(error.to_string()))?;
@@ -36,16 +49,51 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
         summary::validation(validation, &requirements, job.plan.alpha, stdout_width())
     })?;
 
+    unmet(&arguments.report, validation, &requirements, &job).map_or(Ok(()), Err)
+}
+
+/// What is required and not met.
+fn unmet(
+    report: &Path,
+    validation: &Validation,
+    requirements: &[Requirement],
+    job: &EvaluationJob,
+) -> Option<Failure> {
     let unmet = requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
     let unmet: Vec<String> = unmet.collect();
-    if unmet.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::unmet(format!("{}: not met: {}", arguments.report.display(), unmet.join("; "))))
+    (!unmet.is_empty())
+        .then(|| Failure::unmet(format!("{}: not met: {}", report.display(), unmet.join("; "))))
+}
+
+/// What validations on many logs have in common, in words that differ where they do: the options and the model.
+fn of_many(arguments: &ValidateArguments, report: &Report) -> Result<String, Failure> {
+    let own = ValidateArguments { logs: Vec::new(), each: EachArguments::default(), ..arguments.clone() };
+    let report = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
+    Ok(format!("validate {own:?} {report}"))
+}
+
+/// Validates the model on one log of many.
+fn one_of_many(
+    arguments: &ValidateArguments,
+    report: &Report,
+    job: &EvaluationJob,
+    requirements: &[Requirement],
+    log: &Path,
+) -> Result<Done, Failure> {
+    let telling = Telling::Kept(RefCell::default());
+    let loaded = loaded(log, job, &[report], &telling)?;
+    let Validated { validation, .. } = one(&arguments.report, report, &loaded, &job.plan)?;
+    let unmet = unmet(&arguments.report, &validation, requirements, job);
+    Ok(Done::new(&validation, validation.row(), telling.kept(), &validation.warnings)?.with(unmet))
 }
 
 /// Reads the channels of some models from a log.
-pub(super) fn loaded(path: &Path, job: &EvaluationJob, reports: &[&Report]) -> Result<Loaded, Failure> {
+pub(super) fn loaded(
+    path: &Path,
+    job: &EvaluationJob,
+    reports: &[&Report],
+    telling: &Telling,
+) -> Result<Loaded, Failure> {
     let mut names: Vec<String> = Vec::new();
     for name in reports.iter().flat_map(|report| report.model.channels()) {
         if !names.iter().any(|known| known == name) {
@@ -59,7 +107,7 @@ pub(super) fn loaded(path: &Path, job: &EvaluationJob, reports: &[&Report]) -> R
         any: all().any(|clocks| clocks.any),
     };
     let loaded = log::load(path, &job.log, clocks, |_| Ok(names))?;
-    loaded.words.iter().for_each(|word| warn(word));
+    loaded.words.iter().for_each(|word| telling.warn(word));
     Ok(loaded)
 }
 

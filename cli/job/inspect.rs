@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use thetahat::inspect::Inspection;
 
-use super::{Clock, LogJob};
+use super::{Clock, LogJob, only};
 use crate::args::{InspectArguments, Names};
 use crate::failure::Failure;
 use crate::shell::quoted;
@@ -26,7 +26,7 @@ pub(crate) struct InspectJob {
 impl InspectJob {
     pub(crate) fn resolve(arguments: &InspectArguments) -> Result<Self, Failure> {
         Ok(Self {
-            path: arguments.path.clone(),
+            path: only("inspect", &arguments.logs)?.to_owned(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
             inputs: Names::all(&arguments.input),
             output: arguments.output.clone(),

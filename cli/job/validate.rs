@@ -16,7 +16,7 @@ pub(crate) struct EvaluationJob {
 
 impl EvaluationJob {
     /// `read` are the reports and the log.
-    pub(crate) fn resolve(arguments: &EvaluationArguments, read: &[&PathBuf]) -> Result<Self, Failure> {
+    pub(crate) fn resolve(arguments: &EvaluationArguments, read: &[PathBuf]) -> Result<Self, Failure> {
         if read.iter().filter(|path| path.as_path() == Path::new("-")).count() > 1 {
             return Err(Failure::usage(
                 "only one of the reports and the log can come from standard input (-)",

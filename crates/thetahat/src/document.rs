@@ -1,8 +1,12 @@
-//! Documents: how they are written, read and described.
+//! Documents: how they are written, read and described, and what they say in a line of a table.
+
+mod row;
 
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+
+pub use row::{Cell, Row};
 
 use crate::{Error, text};
 

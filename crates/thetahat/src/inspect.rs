@@ -30,6 +30,7 @@ mod outliers;
 mod plan;
 mod quantization;
 mod rest;
+mod row;
 mod run;
 mod saturation;
 mod spectrum;

@@ -112,6 +112,6 @@ pub mod track;
 pub mod tune;
 pub mod validate;
 
-pub use document::{Document, is_document};
+pub use document::{Cell, Document, Row, is_document};
 pub use error::Error;
 pub use thetahat_core;

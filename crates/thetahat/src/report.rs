@@ -47,6 +47,7 @@ mod plan;
 mod process;
 mod reduce;
 mod requirement;
+mod row;
 mod sample;
 mod schema;
 mod shares;

@@ -1,0 +1,124 @@
+//! What has been done with which log, so that a run goes on where another one was interrupted.
+//!
+//! A file of lines in the folder of documents, one for each log that is done: the digest of the log and of all that its row
+//! depends on, and the row. A line is written once its document is on the disk. A line that was cut, and one of another digest, is
+//! as if it were not there.
+
+use std::collections::HashMap;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use thetahat::{Cell, Row};
+use twox_hash::XxHash3_128;
+
+use crate::failure::Failure;
+use crate::replace;
+
+const NAME: &str = "journal.jsonl";
+/// What is read of a log at once.
+const PIECE: usize = 1 << 18;
+
+/// The journal of a folder; this run has it for itself.
+pub(super) struct Journal {
+    path: PathBuf,
+    file: Mutex<File>,
+    /// The digests and rows of earlier runs, by log.
+    known: HashMap<String, (String, Row)>,
+    common: String,
+    reused: AtomicUsize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Line {
+    digest: String,
+    row: Row,
+}
+
+impl Journal {
+    /// That of a folder, which is made if it is not there.
+    ///
+    /// # Errors
+    /// That it cannot be read or written, or that another run has it.
+    pub(super) fn open(folder: &Path, common: &str) -> Result<Self, Failure> {
+        fs::create_dir_all(folder).map_err(|error| Failure::io(folder, "cannot be made", &error))?;
+        replace::sweep(folder);
+        let path = folder.join(NAME);
+        let failed = |error: io::Error| Failure::io(&path, "cannot be read", &error);
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(failed)?;
+        replace::lock(&path, &file)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed)?;
+        let mut known = HashMap::new();
+        for line in bytes.split(|byte| *byte == b'\n') {
+            if let Ok(Line { digest, row }) = serde_json::from_slice(line)
+                && let Some(Cell::Text(log)) = row.get("log")
+            {
+                known.insert(log.clone(), (digest, row));
+            }
+        }
+        // What was cut is a line of its own.
+        if bytes.last().is_some_and(|byte| *byte != b'\n') {
+            file.write_all(b"\n").map_err(failed)?;
+        }
+        file.seek(SeekFrom::End(0)).map_err(failed)?;
+        let common = format!("{} {common}", env!("CARGO_PKG_VERSION"));
+        Ok(Self { path, file: Mutex::new(file), known, common, reused: AtomicUsize::new(0) })
+    }
+
+    /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read.
+    pub(super) fn digest(&self, log: &Path) -> Option<String> {
+        let mut hasher = XxHash3_128::new();
+        hasher.write(self.common.as_bytes());
+        hasher.write(&[0]);
+        let mut file = File::open(log).ok()?;
+        let mut piece = vec![0; PIECE];
+        loop {
+            match file.read(&mut piece) {
+                Ok(0) => return Some(format!("{:032x}", hasher.finish_128())),
+                Ok(count) => hasher.write(&piece[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(_) => return None,
+            }
+        }
+    }
+
+    /// What an earlier run found of a log, if nothing has changed since and its document is still there.
+    pub(super) fn row(&self, log: &Path, digest: &str) -> Option<Row> {
+        let (known, row) = self.known.get(&log.display().to_string())?;
+        let is_there = match row.get("report") {
+            Some(Cell::Text(report)) => Path::new(report).is_file(),
+            _ => true,
+        };
+        (known == digest && is_there).then(|| {
+            self.reused.fetch_add(1, Ordering::Relaxed);
+            row.clone()
+        })
+    }
+
+    /// Notes what was found of a log.
+    ///
+    /// # Errors
+    /// That it cannot be written.
+    pub(super) fn note(&self, digest: &str, row: &Row) -> Result<(), Failure> {
+        let failed = |error: io::Error| Failure::io(&self.path, "cannot be written", &error);
+        let line = Line { digest: digest.to_owned(), row: row.clone() };
+        let mut line = serde_json::to_vec(&line).map_err(|error| failed(error.into()))?;
+        line.push(b'\n');
+        self.file.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line).map_err(failed)
+    }
+
+    /// How many rows were taken from earlier runs.
+    pub(super) fn reused(&self) -> usize {
+        self.reused.load(Ordering::Relaxed)
+    }
+}

@@ -19,7 +19,10 @@ pub(crate) fn numbers<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     static CONVERSION: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     match value.cast::<PyArrayDyn<f64>>() {
-        Ok(array) if array.is_c_contiguous() && is_plain(value) => Ok(array.clone()),
+        // What comes out of a pickle, or lies in a file, may begin anywhere.
+        Ok(array) if array.is_c_contiguous() && array.data().is_aligned() && is_plain(value) => {
+            Ok(array.clone())
+        }
         _ => {
             let conversion = CONVERSION.import(value.py(), "thetahat._numbers", "array")?;
             Ok(calling(value.py(), || conversion.call1((argument, value)))?.cast_into()?)

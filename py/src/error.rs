@@ -23,6 +23,7 @@ pub(crate) fn batch(py: Python<'_>, error: thetahat::Error) -> PyErr {
     match error {
         thetahat::Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         thetahat::Error::Undetermined { parameters, .. } => undetermined(py, message, parameters),
+        thetahat::Error::Argument { .. } => usage(py, message),
         _ => PyValueError::new_err(message),
     }
 }
@@ -56,7 +57,17 @@ pub(crate) fn program(py: Python<'_>, failure: &thetahat_cli::Failure) -> PyErr 
         thetahat_cli::Kind::Interrupted => PyKeyboardInterrupt::new_err(()),
         thetahat_cli::Kind::Undetermined => undetermined(py, message, Vec::new()),
         thetahat_cli::Kind::Io(kind) => io::Error::new(kind, message).into(),
+        thetahat_cli::Kind::Usage => usage(py, message),
         _ => PyValueError::new_err(message),
+    }
+}
+
+/// What is wrong with the arguments, and not with the data: the command line gives it another exit code.
+fn usage(py: Python<'_>, message: String) -> PyErr {
+    let error = PyValueError::new_err(message);
+    match error.value(py).setattr("exit_code", 2) {
+        Ok(()) => error,
+        Err(other) => other,
     }
 }
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat::Document;
 use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::report::{Report, Requirement, Validated};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
+use thetahat::{Cell, Document, is_document};
 
 use crate::error;
 use crate::log::Log;
@@ -115,6 +115,31 @@ pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(
     let found = awaited(py, move |_| thetahat_cli::inspect(&options))?
         .map_err(|failure| error::program(py, &failure))?;
     written(py, &found)
+}
+
+/// What the document of a fit, a validation or an inspection says in a line of a table of many.
+#[pyfunction]
+pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+    let read = || {
+        if is_document::<Inspection>(text) {
+            Inspection::from_json(text).map(|inspection| inspection.row())
+        } else if is_document::<thetahat::report::Validation>(text) {
+            thetahat::report::Validation::from_json(text).map(|validation| validation.row())
+        } else {
+            Report::from_json(text).map(|report| report.row())
+        }
+    };
+    let row = py.detach(read).map_err(|error| error::batch(py, error))?;
+    let cell = |(name, cell): &(String, Cell)| {
+        let value = match cell {
+            Cell::Flag(flag) => flag.into_pyobject(py)?.to_owned().into_any(),
+            Cell::Count(count) => count.into_pyobject(py)?.into_any(),
+            Cell::Number(number) => number.into_pyobject(py)?.into_any(),
+            Cell::Text(text) => text.into_pyobject(py)?.into_any(),
+        };
+        Ok((name.clone(), value))
+    };
+    row.cells().iter().map(cell).collect()
 }
 
 /// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and its table.

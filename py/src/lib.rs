@@ -57,6 +57,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(design::compare_signals, module)?)?;
     online::register(module)?;
     work::register(module)?;
+    module.add_function(wrap_pyfunction!(evaluation::row, module)?)?;
     module.add_function(wrap_pyfunction!(in_python, module)?)?;
     module.add_function(wrap_pyfunction!(write, module)?)?;
     module.add_function(wrap_pyfunction!(run, module)?)

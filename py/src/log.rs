@@ -138,6 +138,17 @@ impl Log {
         Ok(Self { log: Arc::new(log), sources, inputs: self.inputs.clone(), outputs: self.outputs.clone() })
     }
 
+    /// The same log under another name: that of the place from which its file was fetched.
+    fn called(&self, file: String) -> Self {
+        let sources = self.sources.iter().map(|source| Source { file: file.clone(), ..source.clone() });
+        Self {
+            log: Arc::clone(&self.log),
+            sources: sources.collect(),
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+        }
+    }
+
     /// The same log with other roles of its channels.
     fn select(&self, py: Python<'_>, inputs: Vec<String>, outputs: Vec<String>) -> PyResult<Self> {
         let names: Vec<&str> = inputs.iter().chain(&outputs).map(String::as_str).collect();

@@ -4,6 +4,8 @@
 //! threads that only the parent has.
 
 use std::any::Any;
+use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -31,8 +33,19 @@ const FAREWELL: Duration = Duration::from_secs(2);
 /// How long there has to be none for that.
 const QUIET: Duration = Duration::from_millis(30);
 
-/// The threads of this process. A fork has none of its parent's.
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+/// The threads of this process, by how many they are. A fork has none of its parent's.
+static POOLS: Mutex<Pools> = Mutex::new(Pools { process: 0, pools: BTreeMap::new() });
+
+struct Pools {
+    process: u32,
+    /// Of 0 threads as many as there are cores.
+    pools: BTreeMap<usize, Arc<ThreadPool>>,
+}
+
+thread_local! {
+    /// How many threads the calls of this thread share with all others that want as many; 0: as many as there are cores.
+    static THREADS: Cell<usize> = const { Cell::new(0) };
+}
 
 /// Runs a stage of the library without the interpreter lock, see [`awaited`].
 pub(crate) fn interruptible<T: Send + 'static>(
@@ -74,7 +87,7 @@ pub(crate) fn awaited<T: Send + 'static>(
         Err(signal) => {
             asked.store(true, Ordering::Relaxed);
             // What comes next does not wait for the threads that are still at it.
-            known().take();
+            known().pools.remove(&THREADS.get());
             Err(signal)
         }
     }
@@ -88,22 +101,33 @@ pub(crate) fn blocking<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send)
 
 fn pool() -> PyResult<Arc<ThreadPool>> {
     let mut known = known();
-    let process = std::process::id();
-    match &*known {
-        Some((owner, pool)) if *owner == process => Ok(Arc::clone(pool)),
-        _ => {
-            let pool = ThreadPoolBuilder::new().build();
-            let pool =
-                Arc::new(pool.map_err(|error| PyRuntimeError::new_err(format!("no threads: {error}")))?);
-            // The parent's pool is left as it is: there is nobody to end.
-            std::mem::forget(known.replace((process, Arc::clone(&pool))));
-            Ok(pool)
-        }
+    let threads = THREADS.get();
+    if let Some(pool) = known.pools.get(&threads) {
+        return Ok(Arc::clone(pool));
     }
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = Arc::new(pool.map_err(|error| PyRuntimeError::new_err(format!("no threads: {error}")))?);
+    known.pools.insert(threads, Arc::clone(&pool));
+    Ok(pool)
 }
 
-fn known() -> MutexGuard<'static, Option<(u32, Arc<ThreadPool>)>> {
-    POOL.lock().unwrap_or_else(PoisonError::into_inner)
+/// The pools of this process.
+fn known() -> MutexGuard<'static, Pools> {
+    let mut known = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if known.process != process {
+        // The parent's are left as they are: there is nobody to end.
+        std::mem::forget(std::mem::take(&mut known.pools));
+        known.process = process;
+    }
+    known
+}
+
+/// Has the calls of this thread share this many threads with all others that want as many, and gives how many they did; 0: as many
+/// as there are cores.
+#[pyfunction]
+fn threads(count: usize) -> usize {
+    THREADS.replace(count)
 }
 
 /// What Python's handlers of the signals since the last time raise.
@@ -160,6 +184,7 @@ static ENDING: OnceLock<ThreadId> = OnceLock::new();
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     let _ = HERE.set(thread::current().id());
+    module.add_function(wrap_pyfunction!(threads, module)?)?;
     py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
     let os = py.import("os")?;
     if os.hasattr("register_at_fork")? {

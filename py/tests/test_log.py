@@ -313,3 +313,22 @@ def test_a_forked_process_reads_too(tmp_path: Path) -> None:
     assert _length(path) == 1000
     with multiprocessing.get_context("fork").Pool(2) as pool:
         assert pool.map_async(_length, [path, path]).get(timeout=60) == [1000, 1000]
+
+
+def test_arrays_may_begin_anywhere() -> None:
+    """As they do in a pickle whose buffers were sent on their own, and in files that are mapped."""
+    values = np.arange(12.0)
+    memory = bytearray(1 + values.nbytes)
+    memory[1:] = values.tobytes()
+    there = np.frombuffer(memory, np.float64, offset=1)
+    assert not there.flags.aligned
+    log = th.Log(there, there**2)
+    assert log.y.tolist() == values.tolist()
+    buffers: list[pickle.PickleBuffer] = []
+    text = pickle.dumps(log, protocol=5, buffer_callback=buffers.append)
+    assert buffers
+    moved = []
+    for buffer in buffers:
+        own = bytearray(b"x" + buffer.raw())
+        moved.append(memoryview(own)[1:])
+    assert pickle.loads(text, buffers=moved) == log

@@ -19,7 +19,7 @@ import numpy as np
 from narwhals.dependencies import is_pandas_like_dataframe, is_pandas_like_index, is_pandas_like_series
 from numpy.typing import NDArray
 
-from thetahat import _numbers
+from thetahat import _numbers, _said
 
 SECOND = np.timedelta64(1, "s")
 # Steps of a calendar, such as months, differ from their median by no more than what a log takes for uniform.
@@ -456,7 +456,7 @@ def assumed(index: Any) -> Clock:
     if labels.values.dtype.kind in "iu" and (len(steps) == 0 or (steps == 1).all()):
         return Clock("assumed, as the index is a counter", None, labels)
     how = "name it, and give its name as time" if labels.name is None else f"time={labels.name!r} takes it as seconds"
-    warnings.warn(f"the index holds numbers and may be a clock; {how}; 1 s from row to row is assumed", stacklevel=4)
+    _said.warn(f"the index holds numbers and may be a clock; {how}; 1 s from row to row is assumed", stacklevel=4)
     return Clock("assumed, as the index holds numbers", None, labels)
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from thetahat import _options, _thetahat
+from thetahat import _options, _said, _thetahat
 from thetahat._log import Log, handle
 from thetahat._model import Model
 from thetahat._options import Band, Bound, FitOptions, Order, Orders, Rows
@@ -113,7 +112,7 @@ def arx(
         words += _options.words(FitOptions, options, len(log))
         found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
         for warning in found._model.warnings():
-            warnings.warn(warning, EstimationWarning, stacklevel=2)
+            _said.warn(warning, EstimationWarning, stacklevel=2)
         return found
     if couple is not None:
         raise ValueError("couple: it is for logs with several outputs; leave it out")
@@ -626,5 +625,5 @@ def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
     words += [*_options.order_words(**orders), *_options.words(FitOptions, arguments, len(log)), *more]
     fitted = Model._of(_thetahat.fit(data, words))
     for warning in fitted._model.warnings():
-        warnings.warn(warning, EstimationWarning, stacklevel=3)
+        _said.warn(warning, EstimationWarning, stacklevel=3)
     return fitted

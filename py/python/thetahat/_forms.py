@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _files, _options, _thetahat
+from thetahat import _files, _options, _said, _thetahat
 from thetahat._log import handle
 from thetahat._report import ReportedModel
 from thetahat._responses import StateSpace
@@ -178,7 +177,7 @@ class ConvertibleModel(ReportedModel):
         words.append(f"model_{what}" if name is None else _options.text("name", name))
         files, found = self._model.exported(words, None if log is None else handle("log", log))
         for warning in found:
-            warnings.warn(warning, EstimationWarning, stacklevel=2)
+            _said.warn(warning, EstimationWarning, stacklevel=2)
         if folder is not None:
             place = _files.name(folder)
             os.makedirs(place, exist_ok=True)

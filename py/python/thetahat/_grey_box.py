@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from types import SimpleNamespace
@@ -12,7 +11,7 @@ from typing import Any, Union
 
 import numpy as np
 
-from thetahat import _files, _options, _thetahat
+from thetahat import _files, _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
@@ -384,5 +383,5 @@ def grey(
     box = model if isinstance(model, GreyBox) else GreyBox(model)
     found = Model._of(_thetahat.fit_equations(handle("log", log), box._model, words))
     for warning in found.warnings:
-        warnings.warn(warning, EstimationWarning, stacklevel=2)
+        _said.warn(warning, EstimationWarning, stacklevel=2)
     return found

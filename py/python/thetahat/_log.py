@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import io
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _clock, _numbers, _options, _picture, _thetahat
+from thetahat import _clock, _numbers, _options, _picture, _said, _thetahat
 from thetahat._clock import Clock
 from thetahat._options import Duration, ReadOptions, Resample
 
@@ -169,7 +168,7 @@ class Log:
         log, clock = _made(channels, roles, clock, index, sample_time, resample, argument, uniform=uniform)
         if clock.said.startswith("assumed"):
             for name in _frames.clocks(frame, [*names, *outputs])[:1]:
-                warnings.warn(f"column {name!r} looks like a clock; time={name!r} would use it; 1 s is assumed", stacklevel=2)
+                _said.warn(f"column {name!r} looks like a clock; time={name!r} would use it; 1 s is assumed", stacklevel=2)
         return cls._of(log, clock)
 
     @classmethod
@@ -533,7 +532,7 @@ def read_csv(
     if outputs is not None and len(outputs) > 1:
         log = log.select([] if inputs is None else _names("inputs", inputs), outputs)
     for note in notes:
-        warnings.warn(note, stacklevel=2)
+        _said.warn(note, stacklevel=2)
     said = "assumed" if time is None and sample_time is None else "" if time is None else f"by column {time!r}"
     return Log._of(log, Clock(said if resample is None else f"{said}, resampled"))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from thetahat import _files, _numbers, _options, _picture, _thetahat
+from thetahat import _files, _numbers, _options, _picture, _said, _thetahat
 from thetahat._evaluation import Validation
 from thetahat._forms import ConvertibleModel
 from thetahat._log import Log, handle
@@ -194,7 +193,7 @@ class Model(ConvertibleModel):
             values, kept = self._model.clamped_run(None, self._inputs_of(u), initial)
         if kept:
             message = f"{kept} values were kept within 1.1 times the range of the estimation rows"
-            warnings.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning, stacklevel=2)
         return _beside(values)
 
     def sample(
@@ -254,10 +253,10 @@ class Model(ConvertibleModel):
             runs, unstable, varied = self._model.sample(None, self._inputs_of(u), draws, seed, "zero")
         if not varied:
             message = "the covariance of the parameters is not known: the runs differ in their noise alone"
-            warnings.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning, stacklevel=2)
         if unstable:
             message = f"parameters of an unstable model were drawn {unstable} times, and drawn again"
-            warnings.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning, stacklevel=2)
         return runs
 
     def forecast(

@@ -160,7 +160,7 @@ def _of_masked(argument: str, value: np.ma.MaskedArray[Any, Any]) -> Array:
 
 def _of_array(argument: str, found: NDArray[Any], value: Any) -> Array:
     if found.dtype.kind in "biuf":
-        return np.asarray(found, dtype=np.float64, order="C")
+        return np.require(found, np.float64, ["C", "ALIGNED"])
     if found.dtype.kind != "O":
         raise _no_numbers(argument, f"dtype {found.dtype}")
     if found.ndim == 0:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from thetahat import _options, _thetahat
+from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
@@ -171,5 +170,5 @@ def _fitted(log: Log | MeasuredResponse, structure: list[str], options: Mapping[
         words = structure + _options.words(FitOptions, options, len(log))
         found = Model._of(_thetahat.fit_process(handle("log", log), words))
     for warning in found.warnings:
-        warnings.warn(warning, EstimationWarning, stacklevel=3)
+        _said.warn(warning, EstimationWarning, stacklevel=3)
     return found

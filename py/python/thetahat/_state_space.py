@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Union
 
-from thetahat import _options, _thetahat
+from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
@@ -110,5 +109,5 @@ def ss(
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
     for warning in found._model.warnings():
-        warnings.warn(warning, EstimationWarning, stacklevel=2)
+        _said.warn(warning, EstimationWarning, stacklevel=2)
     return found

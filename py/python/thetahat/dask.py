@@ -1,0 +1,241 @@
+"""Many logs on many machines: `thetahat.fit_many` on Dask.
+
+Needs ``pip install "thetahat[dask]"``. Nothing here schedules: Dask shares the work out, repeats what a lost worker had, and is
+interrupted as it always is. A task fits a few logs, one after the other, on one thread of its worker. The same logs and arguments give
+the same rows, whatever the workers.
+
+>>> import dask
+>>> import thetahat as th
+>>> import thetahat.dask
+>>> motor = th.dc_motor()
+>>> with dask.config.set(scheduler="threads"):
+...     table = thetahat.dask.fit_many({"first": motor[:500], "second": motor[500:]}, th.arx, na=2, nb=2).compute()
+>>> table[["log", "model", "dc_gain"]].round(2)
+      log         model  dc_gain
+0   first  ARX(2, 2, 1)    18.77
+1  second  ARX(2, 2, 1)    18.88
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Union
+
+import dask
+import dask.bag
+import dask.dataframe
+import pandas
+from dask.delayed import Delayed
+
+from thetahat import _many, _thetahat
+from thetahat._fit import search
+
+__all__ = ["fit_many", "rows"]
+
+Logs = Union[str, Iterable[Any], Mapping[str, Any], "dask.bag.Bag", "dask.dataframe.DataFrame"]
+
+_TASKS = 1000
+"""A task has more than one log where there would be more tasks than this."""
+_MOST = 32
+"""The logs of a task, at most: so many are done again when a worker is lost."""
+
+
+def fit_many(
+    logs: Logs,
+    fit: Callable[..., Any] = search,
+    *,
+    by: str | None = None,
+    read: Mapping[str, Any] | None = None,
+    reports: str | os.PathLike[str] | None = None,
+    per_task: int | None = None,
+    **options: Any,
+) -> Any:
+    """Fit each of many logs a model of its own, on the workers of Dask.
+
+    The rows are computed at once, and stay on the workers: only then is known which columns there are.
+
+    Parameters
+    ----------
+    logs : iterable, dict of names to logs, str, Bag or DataFrame
+        As for `thetahat.fit_many`: files by paths that all workers see, or by URLs of fsspec, a pattern, `Log`, data frames of pandas;
+        also delayed objects that give any of these, a bag of them, or pairs of name and log in a bag. A data frame of Dask is
+        grouped by a column, see ``by``.
+    fit, read, options
+        As for `thetahat.fit_many`. Functions of your own have to be ones that can be pickled.
+    by : str, optional
+        The column of a data frame of Dask whose values tell the logs apart: the rows of each value are a log, in the order of the
+        column that ``read`` names as ``time``, as the order of rows does not outlast a shuffle. ``read`` has the roles of the others.
+    reports : path or URL, optional
+        A folder that all workers see, for the document of each.
+    per_task : int, optional
+        How many logs a task has. Unless said otherwise one, and more where there are thousands of logs.
+
+    Returns
+    -------
+    dask.dataframe.DataFrame
+        A row for each log, in the order of the logs (of ``by``, in that of its values within each partition), with the columns
+        that `thetahat.Fits.to_pandas` has.
+
+    Raises
+    ------
+    ValueError
+        If the arguments do not make sense, whatever the log; if there is no log, or two have one document.
+
+    Examples
+    --------
+    >>> import dask, pandas
+    >>> import dask.dataframe
+    >>> import thetahat as th
+    >>> import thetahat.dask
+    >>> motor = th.dc_motor().to_pandas().reset_index(names="t").assign(unit=["a", "b"] * 500)
+    >>> frame = dask.dataframe.from_pandas(motor, npartitions=4)
+    >>> roles = {"inputs": "u", "output": "y", "time": "t"}
+    >>> with dask.config.set(scheduler="threads"):
+    ...     table = thetahat.dask.fit_many(frame, th.arx, by="unit", read=roles, na=2, nb=2).compute()
+    >>> sorted(table["log"])
+    ['a', 'b']
+    """
+    parts = dask.persist(*_tasks(logs, _many.Work(fit, options, dict(read or {})), by, reports, per_task))
+    heads = dask.compute(*[dask.delayed(_head)(part) for part in parts])
+    if all(wrong is not None for _, wrong in heads):
+        raise ValueError(heads[0][1])
+    kinds = [own for own, _ in heads]
+    names = _many.columns(kinds)
+    types = {name: _type(set().union(*[own.get(name, ()) for own in kinds])) for name in names}
+    meta = pandas.DataFrame({name: pandas.Series([], dtype=kind) for name, kind in types.items()})
+    return dask.dataframe.from_delayed([dask.delayed(_frame)(part, types) for part in parts], meta=meta, verify_meta=False)
+
+
+def rows(
+    logs: Logs,
+    fit: Callable[..., Any] = search,
+    *,
+    by: str | None = None,
+    read: Mapping[str, Any] | None = None,
+    reports: str | os.PathLike[str] | None = None,
+    per_task: int | None = None,
+    **options: Any,
+) -> dask.bag.Bag:
+    """The rows of `fit_many` as a bag of dicts, of which nothing has been computed yet.
+
+    Examples
+    --------
+    >>> import dask
+    >>> import thetahat as th
+    >>> import thetahat.dask
+    >>> bag = thetahat.dask.rows([th.dc_motor()], th.oe, nb=2, nf=2)
+    >>> with dask.config.set(scheduler="threads"):
+    ...     [row["model"] for row in bag.compute()]
+    ['OE(2, 2, 1)']
+    """
+    return dask.bag.from_delayed(_tasks(logs, _many.Work(fit, options, dict(read or {})), by, reports, per_task))
+
+
+def _tasks(
+    logs: Logs, work: _many.Work, by: str | None, reports: str | os.PathLike[str] | None, per_task: int | None
+) -> list[Delayed]:
+    """Tasks of which each gives the rows of some logs."""
+    if isinstance(logs, dask.dataframe.DataFrame):
+        return _grouped(logs, by, work, reports)
+    if by is not None:
+        raise ValueError("by: it is the column of a data frame of Dask; these logs are apart already")
+    if isinstance(logs, dask.bag.Bag):
+        pairs = [dask.delayed(_pairs)(part, place) for place, part in enumerate(logs.to_delayed())]
+        return [dask.delayed(_each)(work, part, _folder(reports)) for part in pairs]
+    named = _many.name_all(logs)
+    files = _many.reports_of([name for name, _ in named], named, reports)
+    triples = [(name, item, file) for (name, item), file in zip(named, files)]
+    count = min(_MOST, -(-len(triples) // _TASKS)) if per_task is None else per_task
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ValueError(f"per_task={per_task!r}: give a number from 1 on")
+    tasks = [triples[first : first + count] for first in range(0, len(triples), count)]
+    return [dask.delayed(_each)(work, _in_one(task), None) for task in tasks]
+
+
+def _in_one(task: Sequence[tuple[str, Any, str | None]]) -> Any:
+    """The logs of a task: Dask looks for delayed objects only where there are some."""
+    return list(task) if any(isinstance(item, Delayed) for _, item, _ in task) else dask.delayed(list(task), traverse=False)
+
+
+def _each(work: _many.Work, task: Iterable[tuple[str, Any, str | None]], folder: str | None) -> list[dict[str, Any]]:
+    """The rows of some logs."""
+    before = _thetahat.threads(_threads())
+    try:
+        return [work(name, item, f"{folder}/{name}.json" if folder else file)[0] for name, item, file in task]
+    finally:
+        _thetahat.threads(before)
+
+
+def _threads() -> int:
+    """As many as the worker has, which all of its tasks share; 0, as many as there are cores, where there is none."""
+    try:
+        from distributed import get_worker
+
+        return int(get_worker().state.nthreads)
+    except (ImportError, ValueError):
+        return 0
+
+
+def _pairs(part: Iterable[Any], place: int) -> list[tuple[str, Any, None]]:
+    """The logs of a part of a bag, with their names: those of files, of pairs, or their places."""
+    named: list[tuple[str, Any, None]] = []
+    for own, item in enumerate(part):
+        if isinstance(item, tuple) and len(item) == 2 and isinstance(item[0], str):
+            named.append((item[0], item[1], None))
+        else:
+            is_file = isinstance(item, (str, os.PathLike))
+            named.append((os.fspath(item) if is_file else f"{place}.{own}", item, None))
+    return named
+
+
+def _folder(reports: str | os.PathLike[str] | None) -> str | None:
+    return None if reports is None else os.fspath(reports).rstrip("/")
+
+
+def _grouped(
+    frame: dask.dataframe.DataFrame, by: str | None, work: _many.Work, reports: str | os.PathLike[str] | None
+) -> list[Delayed]:
+    """A task for each partition of a frame in which all rows of a value are together."""
+    if by is None:
+        raise ValueError("by: name the column whose values tell the logs apart")
+    time = work.read.get("time")
+    if by not in frame.columns:
+        raise ValueError(f"by: there is no column {by!r}; there are: {', '.join(map(str, frame.columns))}")
+    if not isinstance(time, str) or time not in frame.columns:
+        raise ValueError("read: name the column of times, as in read={'time': 't', …}: a shuffle does not keep the order of rows")
+    together = frame.shuffle(on=by)
+    return [dask.delayed(_groups)(work, part, by, time, _folder(reports)) for part in together.to_delayed()]
+
+
+def _groups(work: _many.Work, part: pandas.DataFrame, by: str, time: str, folder: str | None) -> list[dict[str, Any]]:
+    groups = part.groupby(by, sort=True, dropna=False, observed=True)
+    logs = [(str(name), group.sort_values(time, kind="stable").drop(columns=by).reset_index(drop=True)) for name, group in groups]
+    return _each(work, [(name, log, None) for name, log in logs], folder)
+
+
+def _head(part: Iterable[Mapping[str, Any]]) -> tuple[dict[str, set[type]], str | None]:
+    """The columns of some rows with the types of their values; and what is wrong with the arguments, if that is all they say."""
+    part = list(part)
+    kinds: dict[str, set[type]] = {name: set() for name in _many.columns(part)}
+    for row in part:
+        for name, value in row.items():
+            kinds[name].add(type(value))
+    wrong = part and all(row["exit_code"] == 2 for row in part)
+    return kinds, part[0]["message"] if wrong else None
+
+
+def _type(kinds: set[type]) -> str:
+    """The type of a column in which some values may be missing."""
+    if kinds <= {bool}:
+        return "boolean"
+    if kinds <= {int}:
+        return "Int64"
+    return "Float64" if kinds <= {int, float} else "string"
+
+
+def _frame(part: Iterable[Mapping[str, Any]], types: Mapping[str, str]) -> pandas.DataFrame:
+    part = list(part)
+    return pandas.DataFrame(
+        {name: pandas.array([row.get(name) for row in part], dtype=kind) for name, kind in types.items()}
+    )

@@ -1,0 +1,116 @@
+"""Many logs on a real cluster of two processes."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import dask
+import dask.bag
+import dask.dataframe
+import distributed
+import numpy as np
+import pandas as pd
+import pytest
+
+import thetahat as th
+import thetahat.dask
+from test_many import BROKEN, MOTOR, folder_of_logs
+
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Any]:
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+def rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a table, its missing cells left out."""
+    return [{name: cell for name, cell in row.items() if not pd.isna(cell)} for row in table.to_dict("records")]
+
+
+def test_the_rows_are_those_of_one_process(client: Any, tmp_path: Path) -> None:
+    logs = sorted(folder_of_logs(tmp_path).iterdir())
+    orders: dict[str, Any] = {"na": range(1, 4), "nb": range(1, 4), "nk": 1, "model": "arx"}
+    expected = th.fit_many(logs, **orders, reports=tmp_path / "out")
+    for per_task in (None, 4):
+        table = thetahat.dask.fit_many(logs, **orders, reports=tmp_path / "out", per_task=per_task).compute()
+        assert rows(table) == expected.rows
+        assert list(table.columns) == list(expected.to_pandas().columns)
+    assert (table["exit_code"] != 0).sum() == len(BROKEN)
+    assert Path(table["report"].dropna().iloc[0]).is_file()
+
+
+def test_delayed_objects_and_bags_are_logs(client: Any) -> None:
+    whole = th.fit_many({"a": MOTOR[:500], "b": MOTOR[500:]}, th.arx, na=2, nb=2).rows
+    delayed = {"a": dask.delayed(lambda: th.dc_motor()[:500])(), "b": MOTOR[500:]}
+    assert rows(thetahat.dask.fit_many(delayed, th.arx, na=2, nb=2).compute()) == whole
+    bag = dask.bag.from_sequence([("a", MOTOR[:500]), ("b", MOTOR[500:])], npartitions=2)
+    assert rows(thetahat.dask.fit_many(bag, th.arx, na=2, nb=2).compute()) == whole
+    assert thetahat.dask.rows(bag, th.arx, na=2, nb=2).compute() == whole
+
+
+def test_a_frame_is_grouped_by_a_key(client: Any) -> None:
+    frame = MOTOR.to_pandas().reset_index(names="t").assign(unit=np.arange(1000) % 3)
+    last = frame.iloc[[-1]].assign(unit=7)
+    frame = pd.concat([frame, last]).sample(frac=1, random_state=0)
+    together = dask.dataframe.from_pandas(frame, npartitions=5, sort=False)
+    read: dict[str, Any] = {"inputs": "u", "output": "y", "time": "t"}
+    table = thetahat.dask.fit_many(together, th.arx, by="unit", read=read, na=2, nb=2).compute()
+    own = {row["log"]: row for row in rows(table)}
+    assert sorted(own) == ["0", "1", "2", "7"]
+    for unit in range(3):
+        group = frame[frame["unit"] == unit].sort_values("t")
+        assert own[str(unit)]["a1"] == th.arx(th.Log.from_dataframe(group, **read), na=2, nb=2).parameters[0]
+    # A key with one row.
+    assert own["7"]["exit_code"] in (3, 4) and own["7"]["message"]
+    with pytest.raises(ValueError, match="by: name the column"):
+        thetahat.dask.fit_many(together, th.arx, read=read, na=2, nb=2)
+    with pytest.raises(ValueError, match="the order of rows"):
+        thetahat.dask.fit_many(together, th.arx, by="unit", read={"inputs": "u", "output": "y"}, na=2, nb=2)
+    with pytest.raises(ValueError, match="no column 'no'"):
+        thetahat.dask.fit_many(together, th.arx, by="no", read=read, na=2, nb=2)
+
+
+def slow(log: th.Log, folder: str) -> th.Model:
+    """A fit that says where it is, and waits for a worker to be killed: the first time."""
+    seen = Path(folder, f"{os.getpid()}")
+    if not seen.exists():
+        seen.touch()
+        while not Path(folder, "killed").exists():
+            time.sleep(0.01)
+    return th.arx(log, na=2, nb=2)
+
+
+def test_a_lost_worker_costs_time_and_no_row(client: Any, tmp_path: Path) -> None:
+    logs = {str(first): MOTOR[first : first + 300] for first in range(0, 700, 50)}
+    expected = th.fit_many(logs, th.arx, na=2, nb=2).rows
+    workers = list(client.run(os.getpid).values())
+    found = client.submit(lambda: None)  # the cluster is there
+    found.result()
+    lazy = thetahat.dask.rows(logs, slow, folder=str(tmp_path), per_task=2).persist()
+    while len(list(tmp_path.iterdir())) < 2:
+        time.sleep(0.01)
+    os.kill(workers[0], 9)
+    (tmp_path / "killed").touch()
+    assert lazy.compute() == expected
+
+
+def test_wrong_arguments_are_refused(client: Any) -> None:
+    with pytest.raises(ValueError, match="na"):
+        thetahat.dask.fit_many({"a": MOTOR}, th.arx, na=-1, nb=2)
+    with pytest.raises(TypeError, match="orders"):
+        thetahat.dask.fit_many({"a": MOTOR}, th.arx, na=1, nb=2, orders=3)
+    with pytest.raises(ValueError, match="there is none"):
+        thetahat.dask.fit_many([], th.arx, na=1, nb=2)
+    with pytest.raises(ValueError, match="per_task"):
+        thetahat.dask.fit_many({"a": MOTOR}, th.arx, na=1, nb=2, per_task=0)
+    with pytest.raises(ValueError, match="by"):
+        thetahat.dask.fit_many({"a": MOTOR}, th.arx, by="unit", na=1, nb=2)

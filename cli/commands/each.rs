@@ -208,9 +208,11 @@ impl<W: Fn(&Path) -> Result<Done, Failure> + Sync> Run<'_, W> {
     }
 }
 
-/// Writes the table.
+/// Writes the table. What went wrong stands in front, also where nothing did.
 fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
-    let names = Row::names(rows);
+    let mut first = Row::default();
+    ["log", "exit_code", "message"].into_iter().for_each(|name| first.text(name, ""));
+    let names = Row::names([&first].into_iter().chain(rows));
     output::write_csv(path, |csv| {
         csv.write_record(names.iter().map(|name| output::cell(name)))?;
         for row in rows {

@@ -236,9 +236,9 @@ def checked(found: list[Any]) -> list[Any]:
 
 
 def columns(rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """The names of all cells: each once, after the name that stands before it in the first row that has it."""
-    names: list[str] = []
-    known: set[str] = set()
+    """The names of all cells: what went wrong in front, the others each once, after the name before it in the first row that has it."""
+    names = ["log", "exit_code", "message"]
+    known = set(names)
     for row in rows:
         place = 0
         for name in row:

@@ -78,7 +78,7 @@ const PYTHON: House = House {
         &["grey_box", "log"],
         &["model"],
         &["online"],
-        &["design", "evaluation", "filter", "track"],
+        &["design", "evaluation", "filter", "normal_equations", "track"],
     ],
 };
 

@@ -129,6 +129,7 @@ fn estimation(text: &mut Text, estimation: &Estimation, model: &PolynomialModel)
             let solver = match solver {
                 Solver::NormalEquations => "normal equations",
                 Solver::Qr => "QR",
+                Solver::ExtendedPrecision => "normal equations in twice the precision",
             };
             text.line(&format!("least squares ({solver}), {}", initial(start, 0)));
         }

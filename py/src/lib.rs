@@ -1,6 +1,6 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model`, `evaluation` and `design` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
+//! `log`, `grey_box`, `model`, `normal_equations`, `evaluation` and `design` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
 //! logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
@@ -12,6 +12,7 @@ mod filter;
 mod grey_box;
 mod log;
 mod model;
+mod normal_equations;
 mod online;
 mod track;
 mod work;
@@ -33,6 +34,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<log::Log>()?;
     module.add_class::<grey_box::GreyBox>()?;
     module.add_class::<model::Model>()?;
+    module.add_class::<normal_equations::NormalEquations>()?;
     module.add_class::<evaluation::Validation>()?;
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;

@@ -459,7 +459,7 @@ impl Model {
         }
     }
 
-    fn of(report: Report) -> Self {
+    pub(crate) fn of(report: Report) -> Self {
         let known = Arc::new(report);
         let model = known.model.clone().into();
         Self { model, report: Arc::clone(&known).into(), known, pending: Mutex::new(None) }

@@ -4,6 +4,7 @@
 //!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
 //!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
 //!   response, [`fit_state_space`] ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
+//! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than memory.
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
@@ -42,6 +43,7 @@ mod held_out_runs;
 mod html;
 mod identify;
 mod nonlinear_arx;
+mod normal_equations;
 mod pending;
 mod plan;
 mod process;
@@ -70,6 +72,7 @@ pub use identify::{identify, identify_monitored};
 pub use nonlinear_arx::{
     Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx, fit_nonlinear_arx_monitored,
 };
+pub use normal_equations::NormalEquations;
 pub use pending::PendingEvaluation;
 pub use plan::Plan;
 pub use process::{ProcessPlan, fit_process, fit_process_to_response};

@@ -2,6 +2,7 @@
 
 A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
 `fir`, `iv`, `sriv`), `search` chooses one, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
+`NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -29,6 +30,7 @@ from thetahat._log import Log, dc_motor, read_csv
 from thetahat._many import Fits, fit_many
 from thetahat._model import Model
 from thetahat._narx import narx
+from thetahat._normal_equations import NormalEquations
 from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
 from thetahat._process import process, tf
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
@@ -103,6 +105,7 @@ __all__ = [
     "NarxOptions",
     "NonlinearObservation",
     "NonlinearTransition",
+    "NormalEquations",
     "ObserverTrajectory",
     "OutOfSequenceFilter",
     "ReadOptions",

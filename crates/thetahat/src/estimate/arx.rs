@@ -8,7 +8,7 @@ use crate::Error;
 use crate::data::{Record, measured};
 use crate::estimate::{Estimate, Initial, Procedure};
 use crate::model::Orders;
-use crate::regression::{Lagged, Presample, Regression, Taps, Unsolved};
+use crate::regression::{ExtendedGram, Lagged, Presample, Regression, Taps, Unsolved};
 
 impl Estimate {
     /// The estimate that a triangular factor holds, such as [`arx_factor`] gives or several of them merged.
@@ -28,7 +28,7 @@ impl Estimate {
         Self::of_regression(solved, factor.rows(), Initial::Drop)
     }
 
-    fn of_regression(solved: Regression, samples: usize, initial: Initial) -> Result<Self, Error> {
+    pub(super) fn of_regression(solved: Regression, samples: usize, initial: Initial) -> Result<Self, Error> {
         let parameters = solved.parameters.len();
         let sum_of_squares = solved.residual_norm * solved.residual_norm;
         let noise_variance = sum_of_squares / (samples - parameters) as f64;
@@ -123,6 +123,15 @@ pub fn arx_factor(
         .map_err(|error| Error::data(format!("the record cannot be factored: {error}")))
 }
 
+/// The sums of products of a regression in twice the precision, for normal equations that are solved without the record.
+pub(crate) fn lagged_products(record: &Record<'_>, orders: &Orders) -> Result<ExtendedGram, Error> {
+    linear(orders)?;
+    let signals = signals(record, orders)?;
+    let segments = with_past(record, orders, Presample::Drop);
+    let gram = ExtendedGram::of(&Lagged::new(&signals, taps(orders), &segments, Presample::Drop));
+    if gram.is_in_range() { Ok(gram) } else { Err(out_of_range()) }
+}
+
 /// Least squares needs a predictor that is linear in the parameters.
 pub(super) fn linear(orders: &Orders) -> Result<(), Error> {
     if orders.is_linear() {
@@ -192,7 +201,7 @@ pub(super) fn signals<'a>(record: &Record<'a>, orders: &Orders) -> Result<Vec<&'
 }
 
 /// phi(t) = [-y(t-1) … -y(t-na), u1(t-nk1) … u1(t-nk1-nb1+1), …].
-pub(super) fn taps(orders: &Orders) -> Vec<Taps> {
+pub(crate) fn taps(orders: &Orders) -> Vec<Taps> {
     let output = Taps { signal: 0, first: 1, count: orders.na, sign: -1.0 };
     let inputs = orders.nb.iter().zip(&orders.nk).enumerate();
     std::iter::once(output)
@@ -228,6 +237,6 @@ pub(super) fn unsolved(why: Unsolved, orders: &Orders) -> Error {
     Error::undetermined(concerned, message)
 }
 
-pub(super) fn out_of_range() -> Error {
+pub(crate) fn out_of_range() -> Error {
     Error::data("squares of the signals leave the range of numbers; scale the channels towards one")
 }

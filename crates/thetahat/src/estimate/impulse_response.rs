@@ -45,6 +45,7 @@ use faer::linalg::cholesky::llt;
 use faer::{Mat, Par, Spec};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::arx::{enough, linear, out_of_range, resolved, signals, taps, with_past};
 use super::{Estimate, Initial, Procedure};
@@ -123,7 +124,18 @@ pub(super) fn impulse_response(
     let segments = with_past(record, orders, presample);
     let lagged = Lagged::new(&signals, taps(orders), &segments, presample);
     enough(lagged.rows(), orders)?;
-    let (gram, cross, energy) = gram(&lagged);
+    of_products(gram(&lagged), lagged.rows(), inputs, orders, initial, kernel)
+}
+
+/// The same from Phi' Phi, Phi' y and y' y of so many samples.
+pub(super) fn of_products(
+    (gram, cross, energy): (DMatrix<f64>, DVector<f64>, f64),
+    samples: usize,
+    inputs: usize,
+    orders: &Orders,
+    initial: Initial,
+    kernel: Kernel,
+) -> Result<Estimate, Error> {
     if !(energy.is_normal() && gram.iter().chain(cross.iter()).all(|value| value.is_finite())) {
         return Err(out_of_range());
     }
@@ -140,7 +152,6 @@ pub(super) fn impulse_response(
             ),
         ));
     }
-    let samples = lagged.rows();
     let gram = Mat::from_fn(cross.len(), cross.len(), |i, j| gram[(i, j)]);
     let mut evidence = Evidence::new(gram, cross.as_slice(), energy, samples, &orders.nb[..inputs], kernel);
     let start = evidence.start();

@@ -29,11 +29,15 @@
 //! do not hold).
 
 mod beside;
+mod normal_equations;
 #[cfg(test)]
 mod tests;
 mod worth;
 
 use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::predictor::{InitialCondition, Predictor};
 use super::{
@@ -46,6 +50,7 @@ use crate::estimate::Criteria;
 use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
 use crate::optimize::best_free;
 pub(crate) use beside::Beside;
+pub(crate) use normal_equations::LinearProblem;
 pub(crate) use worth::pays;
 use worth::{OfConstant, conditions, is_worth, lowers_mdl, white_samples};
 
@@ -57,7 +62,8 @@ const CERTAIN: f64 = 2.0;
 const CLEAR: f64 = 8.0;
 
 /// Whether a constant is estimated with the parameters: the level of the output where the inputs are at their offsets.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Constant {
     /// Where it lowers MDL.
     #[default]
@@ -239,22 +245,8 @@ impl Task<'_> {
 
     /// With a constant, whatever it is worth.
     fn wanted(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Fitted, Error> {
-        let missing = |message: &str| Error::undetermined(vec!["constant".to_owned()], message);
-        match self.beside(beside, start) {
-            Ok(Some(found)) => Ok(found.fitted),
-            Ok(None) => Err(missing(
-                "the model has an integrator, A(1) = 0: its output has no level to be estimated; leave the constant out, or \
-                 fit differences of the output",
-            )),
-            // What the data leave open without a constant has its own words.
-            Err(Error::Undetermined { .. }) => Err(self.plain(None).err().unwrap_or_else(|| {
-                missing(
-                    "the data cannot tell the constant or the trend from the other parameters, or have too few rows for both; \
-                     leave it out, or give more rows",
-                )
-            })),
-            Err(error) => Err(error),
-        }
+        let found = self.beside(beside, start).map(|found| found.map(|found| found.fitted));
+        wanted(found, || self.plain(None))
     }
 
     /// With a constant, and what it is worth. None where there is no level.
@@ -384,6 +376,29 @@ impl Task<'_> {
         // What seemed to begin at rest may have begun elsewhere.
         let open = !rests || self.initial == Initial::Auto && orders.nf.iter().any(|&nf| nf > 0);
         rests && orders.na == 0 && from(InitialCondition::Zero) || open && from(InitialCondition::Unknown)
+    }
+}
+
+/// The estimate with a constant, or why there is none.
+fn wanted(
+    with: Result<Option<Fitted>, Error>,
+    without: impl FnOnce() -> Result<Fitted, Error>,
+) -> Result<Fitted, Error> {
+    let missing = |message: &str| Error::undetermined(vec!["constant".to_owned()], message);
+    match with {
+        Ok(Some(found)) => Ok(found),
+        Ok(None) => Err(missing(
+            "the model has an integrator, A(1) = 0: its output has no level to be estimated; leave the constant out, or \
+             fit differences of the output",
+        )),
+        // What the data leave open without a constant has its own words.
+        Err(Error::Undetermined { .. }) => Err(without().err().unwrap_or_else(|| {
+            missing(
+                "the data cannot tell the constant or the trend from the other parameters, or have too few rows for both; \
+                 leave it out, or give more rows",
+            )
+        })),
+        Err(error) => Err(error),
     }
 }
 

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::total::Total;
+
 /// Samples in a block: a few signals of it fit the second-level cache.
 const BLOCK: usize = 1 << 13;
 /// Blocks from which threads pay for themselves.
@@ -52,17 +54,17 @@ pub(super) fn map_blocks<T: Send>(blocks: &[Vec<Segment>], of: impl Fn(&[Segment
 
 /// The sum over all segments of the `size` values that `add` adds for each of them: the first of `sums`, which has room
 /// for as many for each block, at least one.
-pub(super) fn sum_blocks(
+pub(super) fn sum_blocks<T: Total>(
     blocks: &[Vec<Segment>],
     size: usize,
-    sums: &mut [f64],
-    add: impl Fn(&Segment, &mut [f64]) + Sync,
+    sums: &mut [T],
+    add: impl Fn(&Segment, &mut [T]) + Sync,
 ) {
-    sums.fill(0.0);
+    sums.fill(T::ZERO);
     if size == 0 {
         return;
     }
-    let of = |(block, sums): (&Vec<Segment>, &mut [f64])| block.iter().for_each(|segment| add(segment, sums));
+    let of = |(block, sums): (&Vec<Segment>, &mut [T])| block.iter().for_each(|segment| add(segment, sums));
     if blocks.len() < PARALLEL_FROM {
         blocks.iter().zip(sums.chunks_mut(size)).for_each(of);
     } else {
@@ -74,7 +76,7 @@ pub(super) fn sum_blocks(
         for pair in sums.chunks_mut(2 * apart * size) {
             if pair.len() > apart * size {
                 let (left, right) = pair.split_at_mut(apart * size);
-                left[..size].iter_mut().zip(&right[..size]).for_each(|(left, right)| *left += right);
+                left[..size].iter_mut().zip(&right[..size]).for_each(|(left, right)| left.add(*right));
             }
         }
         apart *= 2;

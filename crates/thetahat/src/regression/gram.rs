@@ -9,16 +9,19 @@
 //! All entries of two signals with the same d share one long sum, their common interior, and differ by
 //! at most L products at each end (L is the longest lag). The ends are added to the interior, never
 //! subtracted from a longer sum: subtraction loses digits when a signal grows.
+//! They are sums of numbers, or of numbers of twice the precision (see `total`).
 //! Cost for p lags: about 2 N p multiply-adds and one reading of the signals, instead of N p^2 / 2, however short
 //! the segments are.
 
 use std::ops::Range;
 
+use faer::fx128;
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::blocks::{Segment, blocks, sum_blocks};
-use super::kernel::correlations;
+use super::kernel::extended_sum;
 use super::lagged::{Lagged, Taps, sample};
+use super::total::Total;
 
 /// The lags `low..=high` of one signal; they stand at `offset` in the list of all lags.
 #[derive(Debug, Clone, Copy)]
@@ -46,9 +49,11 @@ impl Diagonal {
     }
 
     /// `x(row - lag) z(row - lag - d)`, zero before the segment's start.
-    fn product<S: AsRef<[f64]>>(&self, signals: &[S], start: usize, row: usize, lag: usize) -> f64 {
-        sample(signals, self.left.signal, start, row, lag)
-            * sample(signals, self.right.signal, start, row, lag.saturating_add_signed(self.difference))
+    fn product<S: AsRef<[f64]>, T: Total>(&self, signals: &[S], start: usize, row: usize, lag: usize) -> T {
+        T::product(
+            sample(signals, self.left.signal, start, row, lag),
+            sample(signals, self.right.signal, start, row, lag.saturating_add_signed(self.difference)),
+        )
     }
 
     fn entry(&self, lag: usize, size: usize) -> usize {
@@ -71,9 +76,9 @@ pub(crate) struct Products {
 
 /// The interior of some segments, and the buffer of the sums over it.
 #[derive(Debug)]
-pub(crate) struct Interior {
+pub(crate) struct Interior<T = f64> {
     blocks: Vec<Vec<Segment>>,
-    sums: Vec<f64>,
+    sums: Vec<T>,
 }
 
 impl Products {
@@ -95,25 +100,33 @@ impl Products {
         span.map_or(0, |span| span.offset + lag - span.low)
     }
 
+    /// The signal of each position.
+    pub(super) fn signals(&self) -> impl Iterator<Item = usize> {
+        self.spans.iter().flat_map(|span| (span.low..=span.high).map(|_| span.signal))
+    }
+
     /// Inside every window: tau from t0, and L samples into the segment so that every partner exists, up to t1 - L.
     fn inside(&self, start: usize, rows: &Range<usize>) -> Range<usize> {
         rows.start.max(start + self.longest)..rows.end.saturating_sub(self.longest)
     }
 
     /// The interior of segments, each given by its first sample and the samples that count.
-    pub(crate) fn interior(&self, segments: impl Iterator<Item = (usize, Range<usize>)>) -> Interior {
+    pub(crate) fn interior<T: Total>(
+        &self,
+        segments: impl Iterator<Item = (usize, Range<usize>)>,
+    ) -> Interior<T> {
         let segments = segments.map(|(start, rows)| Segment { start, rows: self.inside(start, &rows) });
         let blocks = blocks(segments);
-        Interior { sums: vec![0.0; blocks.len().max(1) * self.diagonals.len()], blocks }
+        Interior { sums: vec![T::ZERO; blocks.len().max(1) * self.diagonals.len()], blocks }
     }
 
     /// Adds the products of interiors to `entries`. From sample `supports[s]` on signal s is known to be zero.
-    pub(crate) fn add_interior<S: AsRef<[f64]> + Sync>(
+    pub(crate) fn add_interior<S: AsRef<[f64]> + Sync, T: Total>(
         &self,
         signals: &[S],
         supports: &[usize],
-        interior: &mut Interior,
-        entries: &mut [f64],
+        interior: &mut Interior<T>,
+        entries: &mut [T],
     ) {
         let count = self.diagonals.len();
         sum_blocks(&interior.blocks, count, &mut interior.sums, |segment, sums| {
@@ -121,18 +134,18 @@ impl Products {
         });
         for (diagonal, shared) in self.diagonals.iter().zip(&interior.sums) {
             for lag in diagonal.lags() {
-                entries[diagonal.entry(lag, self.size)] += shared;
+                entries[diagonal.entry(lag, self.size)].add(*shared);
             }
         }
     }
 
     /// Adds the products outside the interior of one segment to `entries`.
-    pub(crate) fn add_ends<S: AsRef<[f64]>>(
+    pub(crate) fn add_ends<S: AsRef<[f64]>, T: Total>(
         &self,
         signals: &[S],
         start: usize,
         rows: &Range<usize>,
-        entries: &mut [f64],
+        entries: &mut [T],
     ) {
         if rows.is_empty() {
             return;
@@ -143,13 +156,40 @@ impl Products {
         }
     }
 
+    /// Adds the sum of each lagged signal over the samples `rows`, all lags of which are there, at its position. O(N + p).
+    pub(super) fn add_sums(&self, signals: &[&[f64]], rows: &Range<usize>, sums: &mut [fx128]) {
+        for &Span { signal, low, high, offset } in &self.spans {
+            let x = signals[signal];
+            let sums = &mut sums[offset..];
+            if rows.len() <= high - low {
+                for lag in low..=high {
+                    sums[lag - low].add(extended_sum(&x[rows.start - lag..rows.end - lag]));
+                }
+                continue;
+            }
+            // What all windows share; then what each has before it, and after it.
+            let shared = extended_sum(&x[rows.start - low..rows.end - high]);
+            let (mut head, mut tail) = (shared, fx128::ZERO);
+            for lag in low..=high {
+                sums[lag - low].add(head);
+                if lag < high {
+                    head.add(fx128::from_f64(x[rows.start - lag - 1]));
+                }
+            }
+            for lag in (low..high).rev() {
+                tail.add(fx128::from_f64(x[rows.end - lag - 1]));
+                sums[lag - low].add(tail);
+            }
+        }
+    }
+
     /// All entries over some segments, each given by its first sample and the samples that count.
-    fn entries(
+    pub(super) fn entries<T: Total>(
         &self,
         signals: &[&[f64]],
         segments: impl Iterator<Item = (usize, Range<usize>)> + Clone,
-    ) -> Vec<f64> {
-        let mut entries = vec![0.0; self.size * self.size];
+    ) -> Vec<T> {
+        let mut entries = vec![T::ZERO; self.size * self.size];
         for (start, rows) in segments.clone() {
             self.add_ends(signals, start, &rows, &mut entries);
         }
@@ -174,7 +214,7 @@ pub(crate) fn joint_gram(
         let later = |segment: &Range<usize>| (segment.start + longest).min(segment.end)..segment.end;
         segments.iter().map(move |segment| (segment.start, later(segment)))
     };
-    let entries = products.entries(signals, counted());
+    let entries: Vec<f64> = products.entries(signals, counted());
     let size = products.size();
     let place = |column: usize| products.position(column % signals.len(), column / signals.len());
     let matrix = DMatrix::from_fn(size, size, |row, column| {
@@ -189,7 +229,7 @@ pub(crate) fn gram(lagged: &Lagged<'_>) -> (DMatrix<f64>, DVector<f64>, f64) {
     let products = Products::new(&lagged.taps);
     let size = products.size();
     let counted = lagged.segments.iter().map(|segment| (segment.start, lagged.counted(segment)));
-    let entries = products.entries(&lagged.signals, counted);
+    let entries: Vec<f64> = products.entries(&lagged.signals, counted);
 
     let columns: Vec<(usize, f64)> =
         lagged.columns().map(|(signal, lag, sign)| (products.position(signal, lag), sign)).collect();
@@ -242,12 +282,12 @@ fn diagonals(spans: &[Span]) -> Vec<Diagonal> {
 }
 
 /// Adds the products of the interior samples `taus`, diagonal by diagonal.
-fn add_segment<S: AsRef<[f64]>>(
+fn add_segment<S: AsRef<[f64]>, T: Total>(
     signals: &[S],
     supports: &[usize],
     diagonals: &[Diagonal],
     taus: &Range<usize>,
-    sums: &mut [f64],
+    sums: &mut [T],
 ) {
     let same =
         |a: &Diagonal, b: &Diagonal| a.left.signal == b.left.signal && a.right.signal == b.right.signal;
@@ -263,21 +303,26 @@ fn add_segment<S: AsRef<[f64]>>(
         if taus.start >= supports[first.left.signal] || from >= supports[first.right.signal] {
             continue;
         }
-        correlations(x, &signals[first.right.signal].as_ref()[from..to], into);
+        T::add_correlations(x, &signals[first.right.signal].as_ref()[from..to], into);
     }
 }
 
 /// Adds what a diagonal's entries have outside the interior of one segment, of which the samples `rows` count.
-fn add_diagonal_ends<S: AsRef<[f64]>>(
+fn add_diagonal_ends<S: AsRef<[f64]>, T: Total>(
     signals: &[S],
     diagonal: &Diagonal,
     start: usize,
     rows: &Range<usize>,
     interior: &Range<usize>,
     size: usize,
-    entries: &mut [f64],
+    entries: &mut [T],
 ) {
-    let product = |row: usize, lag: usize| diagonal.product(signals, start, row, lag);
+    let product = |row: usize, lag: usize| -> T { diagonal.product(signals, start, row, lag) };
+    let total = |rows: Range<usize>, lag: usize| {
+        let mut total = T::ZERO;
+        rows.for_each(|row| total.add(product(row, lag)));
+        total
+    };
     // A lag, or its partner, that is as long as the segment meets zeros only.
     let length = rows.end - start;
     let mut lags = diagonal.lags();
@@ -294,18 +339,18 @@ fn add_diagonal_ends<S: AsRef<[f64]>>(
             (interior.start + low, interior.end + high)
         };
         // The head grows by row t0 with each further lag, the tail by the last row with each lag less.
-        let mut head: f64 = (rows.start..head_end).map(|row| product(row, low)).sum();
+        let mut head = total(rows.start..head_end, low);
         for lag in low..=high {
-            entries[diagonal.entry(lag, size)] += head;
+            entries[diagonal.entry(lag, size)].add(head);
             if lag < high {
-                head += product(rows.start, lag + 1);
+                head.add(product(rows.start, lag + 1));
             }
         }
-        let mut tail: f64 = (tail_start..rows.end).map(|row| product(row, high)).sum();
+        let mut tail = total(tail_start..rows.end, high);
         for lag in (low..=high).rev() {
-            entries[diagonal.entry(lag, size)] += tail;
+            entries[diagonal.entry(lag, size)].add(tail);
             if lag > low {
-                tail += product(rows.end - 1, lag - 1);
+                tail.add(product(rows.end - 1, lag - 1));
             }
         }
     }

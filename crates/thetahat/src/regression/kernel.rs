@@ -1,9 +1,14 @@
 //! The inner loops. Each sum runs in eight fixed lanes without fused multiply-add, so that its bits
-//! are the same on every instruction set that the dispatcher may choose.
+//! are the same on every instruction set that the dispatcher may choose. Where sums have twice the precision, a fused
+//! multiply-add gives what a product lacks, exactly, and so the same bits too.
 
+use faer::fx128;
 use multiversion::multiversion;
 
 const LANES: usize = 8;
+/// Terms of an extended sum between two renormalisations, which take a tenth of its time.
+const TERMS: usize = 256 * LANES;
+static ONES: [f64; TERMS] = [1.0; TERMS];
 /// How many neighbouring shifts one pass serves: eight accumulators fill the registers of AVX2.
 const SHIFTS: usize = 4;
 
@@ -35,6 +40,52 @@ pub(crate) fn product(x: &[f64], y: &[f64]) -> f64 {
         *sum += x * y;
     }
     fold(sum)
+}
+
+/// `x'y` in twice the precision. 17 flops a sample, five times what [`product`] takes.
+///
+/// Source: Ogita, Rump and Oishi, Accurate sum and dot product, SIAM Journal on Scientific Computing 26 (2005), algorithm 5.3 (Dot2).
+pub(crate) fn extended_product(x: &[f64], y: &[f64]) -> fx128 {
+    let chunks = x.chunks(TERMS).zip(y.chunks(TERMS));
+    chunks.fold(fx128::ZERO, |sum, (x, y)| {
+        let (sums, lost) = extended_lanes(x, y);
+        sums.into_iter().zip(lost).fold(sum, |sum, (lane, lost)| {
+            sum.add_accurate(fx128::from_f64(lane)).add_accurate(fx128::from_f64(lost))
+        })
+    })
+}
+
+/// The sum of products in each lane, and what rounding took from it.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2+fma"))]
+fn extended_lanes(x: &[f64], y: &[f64]) -> (Lanes, Lanes) {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
+    let (mut sums, mut lost) = ([0.0; LANES], [0.0; LANES]);
+    for (x, y) in x.iter().zip(y) {
+        for lane in 0..LANES {
+            add_exactly(&mut sums[lane], &mut lost[lane], x[lane], y[lane]);
+        }
+    }
+    for (lane, (x, y)) in x_rest.iter().zip(y_rest).enumerate() {
+        add_exactly(&mut sums[lane], &mut lost[lane], *x, *y);
+    }
+    (sums, lost)
+}
+
+/// sum + lost grows by x y, both errors of rounding included: TwoProduct, and Knuth's TwoSum.
+#[inline(always)]
+fn add_exactly(sum: &mut f64, lost: &mut f64, x: f64, y: f64) {
+    let product = x * y;
+    let rest = x.mul_add(y, -product);
+    let total = *sum + product;
+    let added = total - *sum;
+    let error = (*sum - (total - added)) + (product - added);
+    *sum = total;
+    *lost += error + rest;
+}
+
+/// The sum of `x` in twice the precision.
+pub(crate) fn extended_sum(x: &[f64]) -> fx128 {
+    x.chunks(TERMS).fold(fx128::ZERO, |sum, x| sum.add_accurate(extended_product(x, &ONES[..x.len()])))
 }
 
 /// `x'x`.

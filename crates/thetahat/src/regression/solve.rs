@@ -48,6 +48,8 @@ pub enum Solver {
     NormalEquations,
     /// Householder reflections on blocks of rows: where the regressors are nearly dependent.
     Qr,
+    /// Cholesky of the Gram matrix in twice the precision: where the rows are gone, as those of pieces that were merged.
+    ExtendedPrecision,
 }
 
 /// A solved regression.

@@ -1,6 +1,7 @@
 //! The regression against its definition: the matrix row by row, and double-double arithmetic.
 
 mod double;
+mod extended;
 
 use std::ops::Range;
 

@@ -21,7 +21,7 @@ use in_states::InStates;
 use step_test::StepTest;
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
-const ROUNDING: f64 = 1e-13;
+pub(super) const ROUNDING: f64 = 1e-13;
 
 /// Fits a model to a log and reports on it: the whole way from data to figures.
 ///
@@ -88,22 +88,7 @@ fn fit(
     monitor: Monitor<'_>,
 ) -> Result<(PendingEvaluation, Log), Error> {
     plan.check()?;
-    let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
-    for (position, name) in names.iter().enumerate() {
-        log.channel(name)?;
-        if names[..position].contains(name) {
-            return Err(Error::argument(
-                "channels",
-                format!("'{name}' is named twice; a channel has one role"),
-            ));
-        }
-    }
-    if let Some((name, _)) = plan.offsets.iter().find(|(name, _)| !names.contains(&name.as_str())) {
-        return Err(Error::argument(
-            "offset",
-            format!("'{name}' is neither an input nor the output; name one of: {}", names.join(", ")),
-        ));
-    }
+    let names = channels(&log, plan)?;
     let Shares { estimation, validation, parts } =
         Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let digests = digests(&log, &names, &estimation)?;
@@ -289,8 +274,29 @@ fn fit(
     Ok((PendingEvaluation::open(report, open), log))
 }
 
+/// The channels that a plan names, which the log has, the inputs first.
+pub(super) fn channels<'p>(log: &Log, plan: &'p Plan) -> Result<Vec<&'p str>, Error> {
+    let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
+    for (position, name) in names.iter().enumerate() {
+        log.channel(name)?;
+        if names[..position].contains(name) {
+            return Err(Error::argument(
+                "channels",
+                format!("'{name}' is named twice; a channel has one role"),
+            ));
+        }
+    }
+    if let Some((name, _)) = plan.offsets.iter().find(|(name, _)| !names.contains(&name.as_str())) {
+        return Err(Error::argument(
+            "offset",
+            format!("'{name}' is neither an input nor the output; name one of: {}", names.join(", ")),
+        ));
+    }
+    Ok(names)
+}
+
 /// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
-fn estimation_rows<'l>(
+pub(super) fn estimation_rows<'l>(
     log: &'l Log,
     plan: &Plan,
     orders: &Orders,
@@ -419,20 +425,25 @@ fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>])
     let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
     let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
     if position.is_none_or(used) && largest_of(log)? <= ROUNDING * before {
-        let (role, or) = if position.is_some() { ("input", ", or leave it out") } else { ("output", "") };
-        let what = if plan.detrend == Detrend::Linear { "is a straight line" } else { "is constant" };
-        let concerned = known.map_or_else(Vec::new, |orders| parameters_of(position, orders));
-        let parameters =
-            if concerned.is_empty() { "parameters of a model".to_owned() } else { concerned.join(", ") };
-        return Err(Error::undetermined(
-            concerned,
-            format!(
-                "{role} '{name}' {what} over the estimation rows: it cannot determine {parameters}; name rows in which it \
-                 changes{or}"
-            ),
-        ));
+        return Err(constant(name, position, known, plan.detrend == Detrend::Linear));
     }
     Ok(Signal { name: name.to_owned(), offset })
+}
+
+/// A channel that does not change, or a straight line.
+pub(super) fn constant(name: &str, input: Option<usize>, known: Option<&Orders>, is_line: bool) -> Error {
+    let (role, or) = if input.is_some() { ("input", ", or leave it out") } else { ("output", "") };
+    let what = if is_line { "is a straight line" } else { "is constant" };
+    let concerned = known.map_or_else(Vec::new, |orders| parameters_of(input, orders));
+    let parameters =
+        if concerned.is_empty() { "parameters of a model".to_owned() } else { concerned.join(", ") };
+    Error::undetermined(
+        concerned,
+        format!(
+            "{role} '{name}' {what} over the estimation rows: it cannot determine {parameters}; name rows in which it \
+             changes{or}"
+        ),
+    )
 }
 
 /// The parameters that a channel determines: those of an input's B and F; for the output all of them.
@@ -445,7 +456,7 @@ fn parameters_of(input: Option<usize>, orders: &Orders) -> Vec<String> {
 }
 
 /// How the parameters were found, and what was found beside them: as it is measured from zero, where `taken` was taken before.
-fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
+pub(super) fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
     let Fitted { estimate, criteria, offset, .. } = fitted;
     let above = |base: f64, found: Quantity| Quantity { value: base + found.value, ..found };
     Estimation {

@@ -42,6 +42,11 @@ impl Beside {
         Ok(Self { rows: log.rows(), ramp, middle, half, sample_time: log.sample_time() })
     }
 
+    /// A constant alone, without rows of its own.
+    pub(super) fn constant(sample_time: f64) -> Self {
+        Self { rows: 0, ramp: None, middle: 0.0, half: 1.0, sample_time }
+    }
+
     /// Whether there is a trend beside the constant.
     pub(super) fn has_trend(&self) -> bool {
         self.ramp.is_some()

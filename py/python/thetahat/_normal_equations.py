@@ -1,0 +1,213 @@
+"""One model from many pieces of the data."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from thetahat import _options, _thetahat
+from thetahat._fit import EstimationWarning
+from thetahat._log import Log, handle
+from thetahat._model import Model
+from thetahat._options import FitOptions, Orders
+
+
+class NormalEquations:
+    """The normal equations of a model that is linear in its parameters: of a piece of the data, to be merged with those of others.
+
+    They are the sums of the products of all regressors, in 32 digits, and hold all that least squares asks of the data. So logs that are
+    larger than memory, or spread over machines, give the model that a fit to the whole log would find, in whatever way pieces are
+    grouped. They take some kilobytes, whatever the rows, pickle, and do not change.
+
+    Pieces of one log overlap by the `lags` rows that the model reaches back to: these are a piece's `past`. When pieces are merged, in the
+    order of time, they are compared with the rows that came before. Experiments have a past of 0. Missing samples, and gaps of the clock,
+    are gaps as in any log.
+
+    Parameters
+    ----------
+    log : Log
+        The piece: its past, and the rows of its own.
+    na : int, default 0
+        Coefficients of A: past outputs.
+    nb : int, or one for each input, optional
+        Coefficients of B. Without it the inputs of the log are left out.
+    nk : int, or one for each input, optional
+        Samples from input to first effect: 1, and 0 for `taps`.
+    past : int, default 0
+        How many rows at the front of the piece are of the piece before it: `lags` of them at least, or 0.
+    taps : int, or one for each input, optional
+        In place of na and nb: how many values the impulse response of a finite one has.
+    kernel : {"dc", "tc"} or None, default "dc"
+        What is known of that response, see `fir`.
+    detrend : {"mean", "none"}, optional
+        What is taken from each channel: its mean over all pieces, unless said otherwise.
+    offset : dict of str to float, optional
+        Offsets of channels that are set by hand.
+    constant : {"auto", "yes", "no"}, optional
+        Whether the level of the output is estimated too, see `thetahat.FitOptions`.
+
+    Attributes
+    ----------
+    lags, rows, samples, pieces : int
+        How many rows the model reaches back to; the rows of all pieces, without their past; those that have a full regressor; how many
+        pieces there are.
+
+    Raises
+    ------
+    ValueError
+        If an argument does not make sense, the past is shorter than `lags` or the whole piece, or squares of the signals leave the range
+        of numbers.
+
+    Notes
+    -----
+    Parameters are exact to 1e-15 + 1e-29 kappa^2 of their size for a condition number kappa of the regressors. O(N p) operations.
+    Björck, Numerical Methods for Least Squares Problems, 1996, section 2.2.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.dc_motor()
+    >>> first = th.NormalEquations(log[:400], na=2, nb=2)
+    >>> second = th.NormalEquations(log[398:], na=2, nb=2, past=2)
+    >>> both = first | second
+    >>> both
+    NormalEquations(ARX(2, 2, 1), 1000 rows in 2 pieces, inputs u, output y)
+    >>> bool(abs(both.solve().parameters - th.arx(log, na=2, nb=2).parameters).max() < 1e-12)
+    True
+    """
+
+    _sums: _thetahat.NormalEquations
+
+    def __init__(
+        self,
+        log: Log,
+        na: int | None = None,
+        nb: Orders | None = None,
+        nk: Orders | None = None,
+        *,
+        past: int = 0,
+        taps: int | Sequence[int] | None = None,
+        kernel: str | None = "dc",
+        detrend: str | None = None,
+        offset: Mapping[str, float] | None = None,
+        constant: str | None = None,
+    ) -> None:
+        data = handle("log", log)
+        if taps is not None:
+            if na is not None or nb is not None:
+                raise ValueError("taps: an impulse response has neither na nor nb; leave them out, or give no taps")
+            named = "none" if kernel is None else _options.text("kernel", kernel)
+            words = ["--model=fir", *_options.order_words(taps=taps, nk=0 if nk is None else nk), f"--kernel={named}"]
+        elif na is None and nb is None:
+            raise ValueError("na: give the orders na and nb, or taps")
+        elif nb is None:
+            if nk is not None:
+                raise ValueError("nk: it is for inputs; give nb too, or leave it out")
+            words = ["--model=ar", *_options.order_words(na=na)]
+        else:
+            orders = _options.order_words(na=0 if na is None else na, nb=nb, nk=1 if nk is None else nk)
+            words = ["--model=arx", *orders]
+        words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
+        if _options.integer("past", past) < 0:
+            raise ValueError(f"past: {past} is below 0")
+        self._sums = _thetahat.NormalEquations(data, words, past)
+
+    @classmethod
+    def _of(cls, sums: _thetahat.NormalEquations) -> NormalEquations:
+        made = object.__new__(cls)
+        made._sums = sums
+        return made
+
+    @classmethod
+    def from_json(cls, text: str) -> NormalEquations:
+        """Read them back from the document that `to_json` wrote.
+
+        Raises
+        ------
+        ValueError
+            If it is not such a document, with line and column, or was damaged.
+        """
+        return cls._of(_thetahat.NormalEquations.from_json(_options.text("text", text)))
+
+    def to_json(self) -> str:
+        """The document: exact, to the bit."""
+        return self._sums.to_json()
+
+    def merge(self, *others: NormalEquations) -> NormalEquations:
+        """Those of these pieces and, after them in the order of time, of others. ``a | b`` is the same for two.
+
+        Raises
+        ------
+        ValueError
+            If pieces are of other channels, orders or settings, a piece is given twice, the past of one is not what came before it, or
+            the clock goes back.
+        """
+        for other in others:
+            if not isinstance(other, NormalEquations):
+                raise TypeError(f"others: expected NormalEquations, found {type(other).__name__}")
+        return self._of(self._sums.merged([other._sums for other in others]))
+
+    def solve(self) -> Model:
+        """The model, as a fit to all pieces as one log finds it.
+
+        Its report has the figures that need no second pass over the data: the fit one step ahead. Validate it on other rows.
+
+        Raises
+        ------
+        EstimationError
+            If the data cannot determine the parameters, which are named.
+
+        Warns
+        -----
+        EstimationWarning
+            For what a careful reader of the model should know.
+        """
+        solved = Model._of(self._sums.solve())
+        for warning in solved._model.warnings():
+            warnings.warn(warning, EstimationWarning, stacklevel=2)
+        return solved
+
+    @property
+    def lags(self) -> int:
+        """How many rows the model reaches back to."""
+        return self._sums.lags
+
+    @property
+    def rows(self) -> int:
+        """The rows of all pieces, without their past."""
+        return self._sums.rows
+
+    @property
+    def samples(self) -> int:
+        """The rows that have a full regressor."""
+        return self._sums.samples
+
+    @property
+    def pieces(self) -> int:
+        """How many pieces there are."""
+        return self._sums.pieces
+
+    def __or__(self, other: object) -> NormalEquations:
+        return self.merge(other) if isinstance(other, NormalEquations) else NotImplemented
+
+    def __eq__(self, other: object) -> bool:
+        return self._sums == other._sums if isinstance(other, NormalEquations) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (NormalEquations.from_json, (self.to_json(),))
+
+    def __copy__(self) -> NormalEquations:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> NormalEquations:
+        # Nothing can change them.
+        return self
+
+    def __repr__(self) -> str:
+        *inputs, output = self._sums.channels
+        driven = f"inputs {', '.join(inputs)}" if inputs else "no inputs"
+        pieces = f"{self.pieces} piece{'' if self.pieces == 1 else 's'}"
+        return f"NormalEquations({self._sums.name()}, {self.rows} rows in {pieces}, {driven}, output {output})"

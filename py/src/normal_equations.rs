@@ -1,0 +1,95 @@
+//! One model from many pieces of the data.
+
+use std::ffi::OsString;
+use std::sync::Arc;
+
+use pyo3::prelude::*;
+use thetahat::Document;
+use thetahat::report::NormalEquations as Sums;
+
+use crate::error;
+use crate::log::Log;
+use crate::model::Model;
+use crate::work::interruptible;
+
+/// The normal equations of some pieces: the document of which Python has the text.
+#[pyclass(frozen, module = "thetahat._thetahat")]
+pub(crate) struct NormalEquations(Arc<Sums>);
+
+#[pymethods]
+impl NormalEquations {
+    /// Those of a piece of which the first `past` rows are of the one before it, with the options of `thetahat fit`.
+    #[new]
+    fn new(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>, past: usize) -> PyResult<Self> {
+        let log = log.get();
+        let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output()?.clone())
+            .map_err(|failure| error::program(py, &failure))?;
+        let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
+        let made = interruptible(py, move |_| Sums::new(&channels, &sources, &plan, past))?;
+        Ok(Self(Arc::new(made)))
+    }
+
+    /// Reads the document back.
+    #[staticmethod]
+    fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
+        Ok(Self(Arc::new(Sums::from_json(text).map_err(|error| error::batch(py, error))?)))
+    }
+
+    /// The document.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.to_json().map_err(|error| error::batch(py, error))
+    }
+
+    /// Those of these pieces and of others after them.
+    fn merged(&self, py: Python<'_>, others: Vec<PyRef<'_, Self>>) -> PyResult<Self> {
+        let (own, others) = (Arc::clone(&self.0), others.iter().map(|other| Arc::clone(&other.0)));
+        let others: Vec<Arc<Sums>> = others.collect();
+        let merged = interruptible(py, move |_| {
+            let mut all = (*own).clone();
+            others.iter().try_for_each(|other| all.merge(other))?;
+            Ok(all)
+        })?;
+        Ok(Self(Arc::new(merged)))
+    }
+
+    /// The model.
+    fn solve(&self, py: Python<'_>) -> PyResult<Model> {
+        let own = Arc::clone(&self.0);
+        Ok(Model::of(interruptible(py, move |_| own.solve())?))
+    }
+
+    /// Structure and orders, such as ARX(2, 2, 1).
+    fn name(&self) -> String {
+        self.0.orders().to_string()
+    }
+
+    /// The channels, the output last.
+    #[getter]
+    fn channels(&self) -> Vec<&str> {
+        self.0.channels()
+    }
+
+    #[getter]
+    fn lags(&self) -> usize {
+        self.0.lags()
+    }
+
+    #[getter]
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+
+    #[getter]
+    fn samples(&self) -> usize {
+        self.0.samples()
+    }
+
+    #[getter]
+    fn pieces(&self) -> usize {
+        self.0.pieces()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.0 == other.0
+    }
+}

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import copy
 import functools
+import multiprocessing
 import operator
 import pickle
 from concurrent.futures import ProcessPoolExecutor
-import multiprocessing
-from typing import Optional
+from typing import Any, Optional
 
 import numpy as np
 import pytest
 
 import thetahat as th
 
-ORDERS = {"na": 2, "nb": [2, 1], "nk": [1, 3]}
+ORDERS: dict[str, Any] = {"na": 2, "nb": [2, 1], "nk": [1, 3]}
 LAGS = 3
 
 
@@ -80,7 +80,7 @@ def test_the_model_does_what_others_do(log: th.Log) -> None:
 @pytest.mark.parametrize("detrend", [None, "none"])
 def test_offsets_are_those_of_all_pieces(log: th.Log, detrend: Optional[str], constant: Optional[str]) -> None:
     whole = th.arx(log, **ORDERS, detrend=detrend, constant=constant)
-    options = {"detrend": detrend, "constant": constant}
+    options: dict[str, Any] = {"detrend": detrend, "constant": constant}
     first = th.NormalEquations(log[:1200], **ORDERS, **options)
     second = th.NormalEquations(log[1197:], **ORDERS, past=3, **options)
     found = (first | second).solve()
@@ -91,10 +91,10 @@ def test_offsets_are_those_of_all_pieces(log: th.Log, detrend: Optional[str], co
 
 @pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
 def test_series_and_impulse_responses(log: th.Log) -> None:
-    def both(whole: th.Model, tolerance: float, **orders: object) -> None:
-        lags = th.NormalEquations(log[:500], **orders).lags  # type: ignore[arg-type]
-        first = th.NormalEquations(log[:1600], **orders)  # type: ignore[arg-type]
-        second = th.NormalEquations(log[1600 - lags :], past=lags, **orders)  # type: ignore[arg-type]
+    def both(whole: th.Model, tolerance: float, **orders: Any) -> None:
+        lags = th.NormalEquations(log[:500], **orders).lags
+        first = th.NormalEquations(log[:1600], **orders)
+        second = th.NormalEquations(log[1600 - lags :], past=lags, **orders)
         found = (first | second).solve()
         np.testing.assert_allclose(found.parameters, whole.parameters, rtol=tolerance, atol=tolerance)
         assert found.method == whole.method
@@ -143,13 +143,13 @@ def test_what_does_not_fit_together_is_refused(log: th.Log) -> None:
     with pytest.raises(ValueError, match="the clock goes back over the border"):
         pieces[1] | th.NormalEquations(clock[0][500:], 2, 2, past=2)
     with pytest.raises(TypeError):
-        first | 3  # type: ignore[operator]
+        first | 3
     with pytest.raises(TypeError, match="expected NormalEquations, found int"):
         first.merge(3)  # type: ignore[arg-type]
 
 
 def test_what_makes_no_piece_is_refused(log: th.Log) -> None:
-    for arguments, message in [
+    refused: list[tuple[dict[str, Any], str]] = [
         ({"na": 2, "nb": 2, "past": 1}, "past: 1 rows are fewer than the 2"),
         ({"na": 2, "nb": 2, "past": 3000}, "past: all 3000 rows of the piece"),
         ({"na": 2, "nb": 2, "past": -1}, "past: -1 is below 0"),
@@ -159,9 +159,10 @@ def test_what_makes_no_piece_is_refused(log: th.Log) -> None:
         ({"na": 2, "nb": 2, "detrend": "linear"}, "detrend: what is taken"),
         ({"na": 2, "nb": 2, "offset": {"w": 1.0}}, "'w' is neither an input nor the output"),
         ({"na": range(1, 3), "nb": 2}, "orders: pieces of a log make one model"),
-    ]:
+    ]
+    for arguments, message in refused:
         with pytest.raises(ValueError, match=message):
-            th.NormalEquations(log, **arguments)  # type: ignore[arg-type]
+            th.NormalEquations(log, **arguments)
     with pytest.raises(TypeError, match="past: expected an int"):
         th.NormalEquations(log, 2, 2, past=2.0)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="log: expected a Log"):

@@ -27,6 +27,7 @@ __all__ = [
     "Model",
     "NonlinearObservation",
     "NonlinearTransition",
+    "NormalEquations",
     "ObserverTrajectory",
     "OutOfSequenceFilter",
     "RecursiveArmax",
@@ -185,7 +186,7 @@ class NormalEquations:
     def samples(self) -> int: ...
     @property
     def pieces(self) -> int: ...
-    def __eq__(self, other: object) -> bool: ...
+    def __eq__(self, value: object, /) -> bool: ...
 
 @final
 class Validation:

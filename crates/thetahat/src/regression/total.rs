@@ -38,7 +38,8 @@ impl Total for fx128 {
     const ZERO: Self = fx128::ZERO;
 
     fn product(x: f64, y: f64) -> Self {
-        extended_product(&[x], &[y])
+        // Exact: a product of two numbers has 106 bits at most.
+        fx128::from_f64(x) * fx128::from_f64(y)
     }
 
     fn add(&mut self, other: Self) {

@@ -12,6 +12,7 @@
 //! separate fields.
 
 mod block;
+mod decimal;
 mod dialect;
 mod error;
 mod layout;

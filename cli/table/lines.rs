@@ -35,11 +35,6 @@ impl Lines {
             self.push(row + first, line + first as u64 + ahead);
         }
     }
-
-    /// Forgets everything, keeping the memory.
-    pub(super) fn clear(&mut self) {
-        self.runs.clear();
-    }
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::error::{Error, Position, quoted};
 use super::layout::{Layout, Row};
 use super::number::{NUL_BYTE, Numbers};
 use super::record::Record;
-use super::rows::{Plan, Rows, Workspace};
+use super::rows::{Plan, Rows};
 use super::source::Source;
 use super::stream::{Stream, Text, has_lines};
 use super::time::Clock;
@@ -231,21 +231,19 @@ impl Reader {
             layout,
             mut current,
             mut next,
-            record,
+            mut record,
             mut position,
             line,
             ..
         } = self;
         let plan = Plan { layout, numbers, clock, fields, time: selection.time };
-        let mut workspace = Workspace::new(record);
         let mut rows = Rows::new(plan.fields.len(), line);
-        let mut parsed = 0;
         loop {
             let text = &current.text()[position..];
             let (whole, tail) = text.split_at(memrchr(b'\n', text).map_or(0, |newline| newline + 1));
-            let rows_before = rows.count;
+            let share = source.share_read();
             let (read, filled) = rayon::join(
-                || plan.read(whole, sizes.piece, &mut workspace, &mut rows),
+                || plan.read(whole, sizes.piece, share, &mut record, &mut rows),
                 || {
                     if current.is_last() {
                         return Ok(());
@@ -264,7 +262,7 @@ impl Reader {
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {
-                    let row = Row { record: &workspace.record, text: left, line: rows.line };
+                    let row = Row { record: &record, text: left, line: rows.line };
                     return Err(plan.layout.unclosed(&row));
                 }
                 progress(source.bytes_read(), source.total());
@@ -276,12 +274,6 @@ impl Reader {
             filled?;
             next.prepend(&whole[taken..]);
             progress(source.bytes_read(), source.total());
-            parsed += taken;
-            if let Some(share) = source.share_read() {
-                // What is in the next block is read, but not parsed.
-                let share = share * parsed as f64 / (parsed + next.text().len()) as f64;
-                rows.make_room((rows.count as f64 / share * 1.01) as usize, rows.count - rows_before);
-            }
             std::mem::swap(&mut current, &mut next);
             position = 0;
         }

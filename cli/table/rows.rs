@@ -133,6 +133,7 @@ impl Plan {
             start,
             rows: rows.count,
             lines: rows.lines,
+            words: Vec::new(),
         }
     }
 

@@ -1,7 +1,7 @@
 //! Logs in columns: Parquet files, and Arrow IPC files and streams.
 //!
-//! Both come as batches of Arrow arrays, of the selected columns only. A Parquet file is read from its end, so it has to be a
-//! file; what Arrow writes is read from its beginning, and may come through a pipe.
+//! All come as batches of Arrow arrays, of the selected columns only. Files are read from their end, where their directory is;
+//! only a stream may come through a pipe.
 
 mod batches;
 mod clock;

@@ -4,12 +4,12 @@ use std::cell::Cell;
 use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read};
 use std::panic::{self, AssertUnwindSafe};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Once};
 
 use arrow_array::RecordBatch;
-use arrow_ipc::reader::StreamReader;
+use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
@@ -21,11 +21,6 @@ use super::super::source::{Bytes, Format};
 
 /// The rows of a batch of Parquet, at most. What Arrow writes comes as it was written.
 const BATCH: usize = 1 << 14;
-
-/// How an Arrow file begins and ends.
-const MARK: &[u8] = b"ARROW1";
-/// What is between the beginning of a file and its first message is filled up with zeros to a multiple of this.
-const ALIGNMENT: usize = 8;
 
 /// A format, with its article.
 pub(super) fn named(format: Format) -> &'static str {
@@ -45,12 +40,15 @@ pub(super) enum Opened {
         length: u64,
         metadata: ArrowReaderMetadata,
     },
-    Arrow {
+    File {
         name: String,
-        /// From the schema on.
+        file: File,
+        length: u64,
+    },
+    /// From the schema on.
+    Stream {
+        name: String,
         bytes: Box<dyn Read + Send>,
-        /// Whether it ends as a file does.
-        is_file: bool,
         bytes_read: Arc<AtomicU64>,
         total: Option<u64>,
     },
@@ -59,55 +57,50 @@ pub(super) enum Opened {
 impl Opened {
     pub(super) fn new(path: &Path, bytes: Bytes, format: Format) -> Result<(Self, SchemaRef), Error> {
         let name = bytes.name().to_owned();
-        let refusal = |message: &str| Err(Error::data(&name, None, message));
+        let refusal = |message: String| Err(Error::data(&name, None, message));
         match format {
             Format::EncryptedParquet => {
-                refusal("this Parquet file is encrypted; write it without encryption")
+                refusal("this Parquet file is encrypted; write it without encryption".to_owned())
             }
-            Format::Feather1 => {
-                refusal("this is a Feather file of version 1; write it as version 2, which is an Arrow file")
-            }
-            Format::Parquet if path == Path::new("-") => refusal(
-                "a Parquet file is read from its end, where its directory is, so it cannot come through a pipe; name the file, or \
-                 send an Arrow stream",
+            Format::Feather1 => refusal(
+                "this is a Feather file of version 1; write it as version 2, which is an Arrow file"
+                    .to_owned(),
             ),
-            Format::Parquet if bytes.is_gzip() => refusal(
-                "this Parquet file was compressed as a whole, and is read from its end; unpack it (gunzip)",
-            ),
-            Format::Parquet => Self::parquet(path.to_owned(), name),
-            Format::ArrowFile | Format::ArrowStream => {
-                let is_file = format == Format::ArrowFile;
+            Format::Parquet | Format::ArrowFile if path == Path::new("-") => refusal(format!(
+                "{} is read from its end, where its directory is, so it cannot come through a pipe; name the file, or send an \
+                 Arrow stream",
+                named(format)
+            )),
+            Format::Parquet | Format::ArrowFile if bytes.is_gzip() => refusal(format!(
+                "{} is read from its end, and this one was compressed as a whole; unpack it (gunzip)",
+                named(format)
+            )),
+            Format::Parquet => Self::parquet(path, name),
+            Format::ArrowFile => Self::file(path, name),
+            Format::ArrowStream => {
                 let (bytes_read, total) = bytes.progress();
-                let bytes = bytes.into_reader();
-                // What it is made of has a few bytes each.
-                let mut bytes: Box<dyn Read + Send> = Box::new(BufReader::with_capacity(1 << 16, bytes));
-                if is_file {
-                    bytes = after_mark(bytes).map_err(|error| unread(&name, &error))?;
-                }
+                // A message begins with a few bytes each.
+                let bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());
                 let mut kept = Kept { bytes, copy: Vec::new() };
                 let schema = guarded(|| StreamReader::try_new(&mut kept, None).map(|reader| reader.schema()))
                     .map_err(|error| damaged(&name, 0, &error))?;
                 let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
-                Ok((Self::Arrow { name, bytes, is_file, bytes_read, total }, schema))
+                Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
             }
         }
     }
 
-    fn parquet(path: PathBuf, name: String) -> Result<(Self, SchemaRef), Error> {
-        let opened = File::open(path).and_then(|file| {
-            let length = file.metadata()?.len();
-            Ok((file, length))
-        });
-        let (file, length) = opened.map_err(|error| unread(&name, &error))?;
+    fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+        let (file, length) = opened(path, &name)?;
+        let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(&file), None)?.schema()))
+            .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
+        Ok((Self::File { name, file, length }, schema))
+    }
+
+    fn parquet(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+        let (file, length) = opened(path, &name)?;
         let load = || Ok(ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?);
-        let metadata = guarded(load).map_err(|error| {
-            let reason = escaped(&error.to_string());
-            Error::data(
-                &name,
-                None,
-                format!("this is no whole Parquet file ({reason}); copy it again, or write it anew"),
-            )
-        })?;
+        let metadata = guarded(load).map_err(|error| no_whole_file(&name, "Parquet", &error))?;
         let schema = Arc::clone(metadata.schema());
         Ok((Self::Parquet { name, file, length, metadata }, schema))
     }
@@ -118,33 +111,35 @@ impl Opened {
             Self::Parquet { metadata, .. } => {
                 usize::try_from(metadata.metadata().file_metadata().num_rows()).ok()
             }
-            Self::Arrow { .. } => None,
+            Self::File { .. } | Self::Stream { .. } => None,
         }
     }
 
     /// The rows of some columns, given in ascending order; an error is a message.
     pub(super) fn batches(self, columns: &[usize]) -> Result<Batches, String> {
         let rows = self.rows().unwrap_or(0) as u64;
-        match self {
+        let said = |error: ArrowError| format!("it cannot be read: {}", escaped(&error.to_string()));
+        let columns = columns.to_vec();
+        let (name, form) = match self {
             Self::Parquet { name, file, length, metadata } => {
-                let mask = ProjectionMask::roots(metadata.parquet_schema(), columns.iter().copied());
+                let mask = ProjectionMask::roots(metadata.parquet_schema(), columns);
                 let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
                 let build = || Ok(builder.with_projection(mask).with_batch_size(BATCH).build()?);
-                let reader = guarded(build)
-                    .map_err(|error| format!("it cannot be read: {}", escaped(&error.to_string())))?;
-                Ok(Batches {
-                    name,
-                    rows: 0,
-                    form: Form::Parquet { reader: Box::new(reader), length, of: rows },
-                })
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::Parquet { reader, length, of: rows })
             }
-            Self::Arrow { name, bytes, is_file, bytes_read, total } => {
-                let reader = guarded(|| StreamReader::try_new(bytes, Some(columns.to_vec())))
-                    .map_err(|error| escaped(&error.to_string()))?;
-                let form = Form::Arrow { reader: Box::new(reader), is_file, bytes_read, total };
-                Ok(Batches { name, rows: 0, form })
+            Self::File { name, file, length } => {
+                let build = || FileReader::try_new(BufReader::new(file), Some(columns));
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::File { reader, length, read: 0 })
             }
-        }
+            Self::Stream { name, bytes, bytes_read, total } => {
+                let build = || StreamReader::try_new(bytes, Some(columns));
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::Stream { reader, bytes_read, total })
+            }
+        };
+        Ok(Batches { name, rows: 0, form })
     }
 }
 
@@ -164,9 +159,14 @@ enum Form {
         /// How many rows there are.
         of: u64,
     },
-    Arrow {
+    File {
+        reader: Box<FileReader<BufReader<File>>>,
+        length: u64,
+        /// How many batches came.
+        read: usize,
+    },
+    Stream {
         reader: Box<StreamReader<Box<dyn Read + Send>>>,
-        is_file: bool,
         bytes_read: Arc<AtomicU64>,
         total: Option<u64>,
     },
@@ -175,23 +175,12 @@ enum Form {
 impl Batches {
     /// The number of bytes read so far, and of how many if that is known.
     pub(super) fn progress(&self) -> (u64, Option<u64>) {
+        let share =
+            |part: f64, all: f64, length: u64| ((length as f64 * part / all.max(1.0)) as u64, Some(length));
         match &self.form {
-            Form::Parquet { length, of, .. } => {
-                let share = self.rows as f64 / (*of).max(1) as f64;
-                ((*length as f64 * share) as u64, Some(*length))
-            }
-            Form::Arrow { bytes_read, total, .. } => (bytes_read.load(Ordering::Relaxed), *total),
-        }
-    }
-
-    /// Whether an Arrow file ends as it must: it was cut off if not.
-    fn check_end(&mut self) -> Option<Error> {
-        let Form::Arrow { reader, is_file: true, .. } = &mut self.form else { return None };
-        let mut end = Vec::new();
-        match reader.get_mut().read_to_end(&mut end) {
-            Err(error) => Some(unread(&self.name, &error)),
-            Ok(_) if end.ends_with(MARK) => None,
-            Ok(_) => Some(cut_off(&self.name, self.rows)),
+            Form::Parquet { length, of, .. } => share(self.rows as f64, *of as f64, *length),
+            Form::File { reader, length, read } => share(*read as f64, reader.num_batches() as f64, *length),
+            Form::Stream { bytes_read, total, .. } => (bytes_read.load(Ordering::Relaxed), *total),
         }
     }
 }
@@ -201,16 +190,19 @@ impl Iterator for Batches {
 
     fn next(&mut self) -> Option<Self::Item> {
         let batch = match &mut self.form {
-            Form::Parquet { reader, .. } => guarded(|| reader.next().transpose()).transpose(),
-            Form::Arrow { reader, .. } => guarded(|| reader.next().transpose()).transpose(),
+            Form::Parquet { reader, .. } => guarded(|| reader.next().transpose()),
+            Form::File { reader, read, .. } => {
+                *read += 1;
+                guarded(|| reader.next().transpose())
+            }
+            Form::Stream { reader, .. } => guarded(|| reader.next().transpose()),
         };
-        match batch {
-            Some(Ok(batch)) => {
+        match batch.transpose()? {
+            Ok(batch) => {
                 self.rows += batch.num_rows() as u64;
                 Some(Ok(batch))
             }
-            Some(Err(error)) => Some(Err(damaged(&self.name, self.rows, &error))),
-            None => self.check_end().map(Err),
+            Err(error) => Some(Err(damaged(&self.name, self.rows, &error))),
         }
     }
 }
@@ -238,25 +230,13 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, ArrowError>) -> Result<T, ArrowEr
     })
 }
 
-/// The bytes of an Arrow file after its mark, which zeros fill up.
-fn after_mark(mut bytes: Box<dyn Read + Send>) -> io::Result<Box<dyn Read + Send>> {
-    let mut block = [0; ALIGNMENT];
-    bytes.read_exact(&mut block)?;
-    loop {
-        bytes.read_exact(&mut block)?;
-        if block != [0; ALIGNMENT] {
-            return Ok(Box::new(Cursor::new(block).chain(bytes)));
-        }
-    }
-}
-
 /// A stream of which a copy is kept.
-struct Kept {
-    bytes: Box<dyn Read + Send>,
+struct Kept<R> {
+    bytes: R,
     copy: Vec<u8>,
 }
 
-impl Read for Kept {
+impl<R: Read> Read for Kept<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.bytes.read(buffer)?;
         self.copy.extend_from_slice(buffer.get(..count).unwrap_or_default());
@@ -264,27 +244,34 @@ impl Read for Kept {
     }
 }
 
-fn unread(name: &str, error: &io::Error) -> Error {
-    match error.kind() {
-        io::ErrorKind::UnexpectedEof => cut_off(name, 0),
-        _ => Error::io(name, format!("cannot be read: {error}")),
-    }
+/// A file, and its length.
+fn opened(path: &Path, name: &str) -> Result<(File, u64), Error> {
+    let opened = File::open(path).and_then(|file| {
+        let length = file.metadata()?.len();
+        Ok((file, length))
+    });
+    opened.map_err(|error| Error::io(name, format!("cannot be read: {error}")))
 }
 
-fn cut_off(name: &str, rows: u64) -> Error {
-    let message = format!("the file ends too early, after {rows} whole rows: it is truncated; copy it again");
+fn no_whole_file(name: &str, format: &str, error: &ArrowError) -> Error {
+    let reason = escaped(&error.to_string());
+    let message = format!("this is no whole {format} file ({reason}); copy it again, or write it anew");
     Error::data(name, None, message)
 }
 
 /// Says what an error of a reader means after so many rows.
 fn damaged(name: &str, rows: u64, error: &ArrowError) -> Error {
     match error {
-        ArrowError::IoError(_, error) if error.kind() == io::ErrorKind::UnexpectedEof => cut_off(name, rows),
+        ArrowError::IoError(_, error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+            let message =
+                format!("it ends too early, after {rows} whole rows: it is truncated; copy it again");
+            Error::data(name, None, message)
+        }
         ArrowError::IoError(_, error) => Error::io(name, format!("cannot be read: {error}")),
         error => {
             let reason = escaped(&error.to_string());
             let message =
-                format!("the file is damaged after {rows} rows ({reason}); copy it again, or write it anew");
+                format!("it is damaged after {rows} rows ({reason}); copy it again, or write it anew");
             Error::data(name, None, message)
         }
     }

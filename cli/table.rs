@@ -35,9 +35,9 @@ mod time;
 use crate::memory::Bound;
 
 pub(crate) use error::{Error, ErrorKind};
-pub(crate) use formats::{Event, Reader, Stream};
+pub(crate) use formats::{Reader, Stream};
 pub(crate) use lines::Lines;
-pub(crate) use mailbox::Waker;
+pub(crate) use mailbox::{Event, Waker};
 pub(crate) use names::{list, names};
 
 /// How a log is written, as far as it is not recognised by itself.

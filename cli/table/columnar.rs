@@ -19,9 +19,9 @@ use arrow_schema::Schema;
 
 use super::error::{Error, escaped, shortened};
 use super::lines::Lines;
-use super::mailbox::{Mailbox, Message, Waker};
+use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::source::{Bytes, Format};
-use super::{Event, Options, Selection, Table};
+use super::{Options, Selection, Table};
 use batches::{Batches, Opened};
 use clock::Clock;
 use values::{Kind, numbers};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::error::Error;
-use super::mailbox::Waker;
+use super::mailbox::{Event, Waker};
 use super::reader::{SIZES, TextReader};
 use super::source::{Bytes, Source};
 use super::stream::TextStream;
@@ -11,21 +11,6 @@ use super::{Options, Selection, Table};
 
 #[cfg(feature = "columnar")]
 use super::columnar::{ColumnarReader, ColumnarStream};
-
-/// What comes next.
-#[derive(Debug)]
-pub(crate) enum Event {
-    /// A row: [`Stream::values`] and [`Stream::time`] are its own.
-    Row,
-    /// A line that is no row. It was left out.
-    Malformed(Error),
-    /// There is nothing more at the moment: the next call waits. Told once each time.
-    Idle,
-    /// The log ends here.
-    End,
-    /// The program was asked to end.
-    Stopped,
-}
 
 /// A log whose columns are known and whose rows are still to be read.
 pub(crate) enum Reader {

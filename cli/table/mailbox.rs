@@ -7,6 +7,21 @@ use super::error::Error;
 /// How many pieces may wait.
 const WAITING: usize = 4;
 
+/// What comes next.
+#[derive(Debug)]
+pub(crate) enum Event {
+    /// A row: what the stream gives is its own.
+    Row,
+    /// A line that is no row. It was left out.
+    Malformed(Error),
+    /// There is nothing more at the moment: the next call waits. Told once each time.
+    Idle,
+    /// The log ends here.
+    End,
+    /// The program was asked to end.
+    Stopped,
+}
+
 /// What the thread that reads, and whoever ends the stream, tell the one that takes the rows.
 pub(super) enum Message<Piece> {
     Piece(Piece),

@@ -5,13 +5,13 @@ use std::thread;
 
 use memchr::memchr;
 
+use super::Selection;
 use super::error::Error;
 use super::layout::Row;
-use super::mailbox::{Mailbox, Message};
+use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::record::Record;
 use super::rows::Plan;
 use super::source::Source;
-use super::{Event, Selection, Waker};
 
 /// What is read at once, at most. A pipe gives less.
 const PIECE: usize = 1 << 16;

@@ -66,11 +66,13 @@ impl Opened {
                 "this is a Feather file of version 1; write it as version 2, which is an Arrow file"
                     .to_owned(),
             ),
-            Format::Parquet | Format::ArrowFile if path == Path::new("-") => refusal(format!(
-                "{} is read from its end, where its directory is, so it cannot come through a pipe; name the file, or send an \
+            Format::Parquet | Format::ArrowFile if path == Path::new("-") || bytes.progress().1.is_none() => {
+                refusal(format!(
+                    "{} is read from its end, where its directory is, so it cannot come through a pipe; name the file, or send an \
                  Arrow stream",
-                named(format)
-            )),
+                    named(format)
+                ))
+            }
             Format::Parquet | Format::ArrowFile if bytes.is_gzip() => refusal(format!(
                 "{} is read from its end, and this one was compressed as a whole; unpack it (gunzip)",
                 named(format)

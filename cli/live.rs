@@ -59,7 +59,9 @@ impl Live {
             return Ok(Next::Stopped);
         }
         self.is_blank = false;
-        match self.stream.next()? {
+        let event = self.stream.next()?;
+        self.stream.words().iter().for_each(|word| warn(word));
+        match event {
             Event::Row => self.look_at_the_clock()?,
             Event::Malformed(error) => self.malformed(error.into())?,
             Event::Idle => return Ok(Next::Idle),
@@ -73,7 +75,7 @@ impl Live {
     /// A row with the time of the one before is one too many; an earlier time is a clock that was set back.
     fn look_at_the_clock(&mut self) -> Result<(), Failure> {
         let Some(time) = self.stream.time() else { return Ok(()) };
-        let place = format_args!("{}:{}", self.name, self.stream.line()).to_string();
+        let place = self.place();
         match self.last {
             Some(last) if time == last => {
                 let message = format!("{place}: the time is that of the row before; take the row out");
@@ -125,9 +127,9 @@ impl Live {
         self.stream.time().is_some()
     }
 
-    /// The line on which the row at hand is.
-    pub(crate) fn line(&self) -> u64 {
-        self.stream.line()
+    /// The row at hand as messages name it.
+    pub(crate) fn place(&self) -> String {
+        self.stream.place(&self.name)
     }
 
     /// The number of the row at hand, counted from 1.

@@ -1,4 +1,4 @@
-//! From a text table to a log: which columns, which clock, and on which line an error is.
+//! From a table to a log: which columns, which clock, and in which row an error is.
 
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -169,7 +169,7 @@ pub(crate) fn at_line(file: &str, lines: &Lines) -> impl Fn(Error) -> Failure {
     move |error| {
         Failure::about(&error, |row| match row {
             // The library counts rows from 1, the table from 0.
-            Some(row) => format!("{file}:{}", lines.of(row - 1)),
+            Some(row) => lines.place(file, row - 1),
             None => file.to_owned(),
         })
     }
@@ -195,12 +195,13 @@ fn columns(
     let reader = Reader::open(path, &table::Options { bound, ..job.options.clone() })?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
-    let (selection, words) = selected(&reader, &file, job, &names)?;
+    let (selection, mut words) = selected(&reader, &file, job, &names)?;
 
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
     let mut table = reader.read(&selection, &mut update)?;
     drop(progress);
+    words.append(&mut table.words);
 
     let values = std::mem::take(&mut table.columns);
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
@@ -229,9 +230,8 @@ fn selected(
         Clock::Column { name, .. } => Some(find(name, header).map_err(bad)?),
         Clock::Fixed(_) => None,
         Clock::Unknown => {
-            if let Some(name) =
-                header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()))
-            {
+            let called = || header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()));
+            if let Some(name) = reader.times().first().and_then(|&time| header.get(time)).or_else(called) {
                 words.push(format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
             }
             None

@@ -1,10 +1,10 @@
-//! Logs in text tables (CSV), read into columns of numbers.
+//! Logs in tables, read into columns of numbers: text (CSV), Parquet, and Arrow IPC files and streams.
 //!
-//! [`Reader::open`] reads as far as the first row and knows the columns' names; [`Reader::read`] reads the
-//! columns that were selected. The file is never held in memory: it passes through two blocks of a mebibyte.
-//! [`Reader::open_live`] and [`Reader::stream`] give the rows one by one as they come.
+//! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
+//! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks
+//! of a mebibyte, the others batch by batch. [`Reader::open_live`] and [`Reader::stream`] give the rows one by one as they come.
 //!
-//! What is understood: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
+//! What is understood of texts: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
 //! lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
 //! as seconds, as ISO 8601 or in a given format.
 //!
@@ -12,10 +12,15 @@
 //! separate fields.
 
 mod block;
+#[cfg(feature = "columnar")]
+mod columnar;
+mod decimal;
 mod dialect;
 mod error;
+mod formats;
 mod layout;
 mod lines;
+mod mailbox;
 mod names;
 mod number;
 mod reader;
@@ -30,10 +35,10 @@ mod time;
 use crate::memory::Bound;
 
 pub(crate) use error::{Error, ErrorKind};
+pub(crate) use formats::{Reader, Stream};
 pub(crate) use lines::Lines;
+pub(crate) use mailbox::{Event, Waker};
 pub(crate) use names::{list, names};
-pub(crate) use reader::Reader;
-pub(crate) use stream::{Event, Stream, Waker};
 
 /// How a log is written, as far as it is not recognised by itself.
 #[derive(Clone, Debug)]
@@ -122,6 +127,8 @@ pub(crate) struct Table {
     pub(crate) start: Option<String>,
     /// The number of rows.
     pub(crate) rows: usize,
-    /// The line on which each row is.
+    /// The line on which each row is; nothing where there are no lines.
     pub(crate) lines: Lines,
+    /// What the reader should know, in plain words.
+    pub(crate) words: Vec<String>,
 }

@@ -9,6 +9,8 @@ mod browser;
 mod c_library;
 mod choice;
 mod clock;
+#[cfg(feature = "columnar")]
+mod columnar;
 mod compare;
 mod constant;
 mod control;

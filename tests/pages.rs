@@ -193,9 +193,12 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");
-    fs::create_dir_all(folder.path("tests/data/public")).expect("the folder can be written to");
+    for subfolder in ["tests/data/public", "tests/data/columnar"] {
+        fs::create_dir_all(folder.path(subfolder)).expect("the folder can be written to");
+    }
     let public = files("tests/data/public", ".csv");
-    for file in [files("tests/data", ".toml"), files("tests/data", ".csv"), public].concat() {
+    let columnar = files("tests/data/columnar", ".parquet");
+    for file in [files("tests/data", ".toml"), files("tests/data", ".csv"), public, columnar].concat() {
         folder.write(&file, fs::read(root().join(&file)).expect("data"));
     }
     let (mut compared, mut code) = (0, 0);

@@ -10,7 +10,7 @@ use crate::table;
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Clock")]
 pub(crate) struct LiveClockArguments {
-    /// The column of times: seconds, or ISO 8601 dates
+    /// The column of times: seconds, ISO 8601 dates, or the timestamps and durations of a Parquet or Arrow file
     #[arg(long, value_name = "NAME")]
     pub(crate) time: Option<String>,
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
@@ -75,7 +75,7 @@ pub(crate) struct LogArguments {
 /// The log's clock.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ClockArguments {
-    /// The column of times: seconds, or ISO 8601 dates
+    /// The column of times: seconds, ISO 8601 dates, or the timestamps and durations of a Parquet or Arrow file
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time: Option<String>,
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S

@@ -175,7 +175,7 @@ impl<'a> Run<'a> {
 
     /// Takes in the row at hand.
     fn row(&mut self) -> Result<(), Failure> {
-        let Self { job, name, live, lines, columns, filter, kept, .. } = self;
+        let Self { job, live, lines, columns, filter, kept, .. } = self;
         // Without its time a row has no place; the next one tells how long it took.
         if live.has_clock() && live.time().is_none() {
             return Ok(());
@@ -187,8 +187,8 @@ impl<'a> Run<'a> {
             .step(step, inputs, outputs)
             .map_err(|error| {
                 Failure::data(format!(
-                    "{name}:{}: {error}; if the log is right, the filter has diverged: start it nearer, or with larger noises",
-                    live.line()
+                    "{}: {error}; if the log is right, the filter has diverged: start it nearer, or with larger noises",
+                    live.place()
                 ))
             })?;
         if job.smooth {

@@ -136,7 +136,7 @@ impl Chosen {
         ];
         let names = reader.names();
         let is_time = |name: &str| matches!(&job.log.clock, Clock::Column { name: time, .. } if time == name);
-        let nameless: HashSet<usize> = reader.nameless().collect();
+        let nameless: HashSet<usize> = reader.nameless().into_iter().collect();
         let mut count: HashMap<&str, usize> = HashMap::with_capacity(names.len());
         names.iter().for_each(|name| *count.entry(name).or_default() += 1);
         let mut readable: Vec<String> = Vec::new();

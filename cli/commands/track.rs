@@ -182,7 +182,7 @@ impl<'a> Run<'a> {
                 }
                 Next::Stopped => return Ok(Ended::Stopped),
             }
-            let alarm = match self.place.of_row(&self.state, &self.live, &self.name)? {
+            let alarm = match self.place.of_row(&self.state, &self.live)? {
                 RowPlace::Old => continue,
                 place => {
                     self.midway = true;
@@ -202,7 +202,7 @@ impl<'a> Run<'a> {
 
     /// Takes in the row at hand; says whether there was an alarm.
     fn row(&mut self, after_gap: bool) -> Result<bool, Failure> {
-        let Self { job, name, live, lines, columns, state, unsaved, memory, .. } = self;
+        let Self { job, live, lines, columns, state, unsaved, memory, .. } = self;
         *unsaved = true;
         let row = Row {
             values: live.values(),
@@ -212,7 +212,7 @@ impl<'a> Run<'a> {
             after_gap,
         };
         let mut session = Session { every: job.lines.every, details: false, columns, state, lines, memory };
-        session.row(&row, || format!("{name}:{}", live.line()), |_| ())
+        session.row(&row, || live.place(), |_| ())
     }
 
     fn save(&mut self) -> Result<(), Failure> {

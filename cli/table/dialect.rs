@@ -82,6 +82,10 @@ impl Dialect {
 
     /// The length of the line at the front of a text if it is blank or a comment, its newline included.
     pub(super) fn skipped_line(&self, text: &[u8]) -> Option<usize> {
+        // Most lines are seen at once to be neither.
+        if matches!(text.first(), Some(b'0'..=b'9' | b'-')) {
+            return None;
+        }
         let start = text.iter().position(|&byte| !self.is_blank(byte))?;
         let first = text[start];
         if first == b'\n' {

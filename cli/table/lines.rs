@@ -12,8 +12,17 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
+    /// A row of a file as messages name it: by its line, as an editor counts, or without lines by its number.
+    pub(crate) fn place(&self, file: &str, row: usize) -> String {
+        if self.runs.is_empty() {
+            format!("{file}: row {}", row + 1)
+        } else {
+            format!("{file}:{}", self.of(row))
+        }
+    }
+
     /// The line on which a row starts. A row beyond the last one is taken to follow it directly.
-    pub(crate) fn of(&self, row: usize) -> u64 {
+    pub(super) fn of(&self, row: usize) -> u64 {
         let run = self.runs.partition_point(|&(first, _)| first <= row);
         let ahead = run.checked_sub(1).and_then(|run| self.runs.get(run));
         row as u64 + ahead.map_or(1, |&(_, ahead)| ahead)
@@ -34,11 +43,6 @@ impl Lines {
         for &(first, ahead) in &piece.runs {
             self.push(row + first, line + first as u64 + ahead);
         }
-    }
-
-    /// Forgets everything, keeping the memory.
-    pub(super) fn clear(&mut self) {
-        self.runs.clear();
     }
 }
 

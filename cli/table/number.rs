@@ -2,6 +2,7 @@
 
 use memchr::memchr;
 
+use super::decimal;
 use super::error::{quoted, shortened};
 
 /// What stands for a missing value without being declared, in lower case.
@@ -41,7 +42,10 @@ impl Numbers {
         if self.decimal_comma {
             return None;
         }
-        let (value, length) = fast_float2::parse_partial::<f64, _>(text).ok()?;
+        let (value, length) = match decimal::short(text) {
+            Some(short) => short,
+            None => fast_float2::parse_partial::<f64, _>(text).ok()?,
+        };
         // It reads `inf` and `nan` too, and an overflow as infinity.
         value.is_finite().then(|| (self.without_missing(value), length))
     }

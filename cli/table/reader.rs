@@ -1,6 +1,4 @@
-//! Reading a log from its first byte to its last.
-
-use std::path::Path;
+//! Reading a text table from its first byte to its last.
 
 use memchr::{memchr, memchr_iter, memrchr};
 
@@ -10,9 +8,9 @@ use super::error::{Error, Position, quoted};
 use super::layout::{Layout, Row};
 use super::number::{NUL_BYTE, Numbers};
 use super::record::Record;
-use super::rows::{Plan, Rows, Workspace};
+use super::rows::{Plan, Rows};
 use super::source::Source;
-use super::stream::{Stream, Text, has_lines};
+use super::stream::{Text, TextStream, has_lines};
 use super::time::Clock;
 use super::{Options, Selection, Table};
 
@@ -33,8 +31,8 @@ const LOOKED_AT: usize = 1000;
 /// The sizes for real files.
 pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
 
-/// A log whose columns are known and whose rows are still to be read.
-pub(crate) struct Reader {
+/// A text table whose columns are known and whose rows are still to be read.
+pub(crate) struct TextReader {
     options: Options,
     sizes: Sizes,
     source: Source,
@@ -51,21 +49,9 @@ pub(crate) struct Reader {
     line: u64,
 }
 
-impl Reader {
-    /// Opens a log, or standard input for `-`, and reads as far as its first row.
-    pub(crate) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
-        options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
-        Self::start(Source::open(path, options.encoding)?, options, SIZES)
-    }
-
-    /// Opens a log as [`open`](Reader::open) does, without asking for more than it takes to know its columns: it may be
-    /// a pipe on which the next row is yet to come. For [`stream`](Reader::stream).
-    pub(crate) fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
-        options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
-        Self::start_live(Source::open(path, options.encoding)?, options)
-    }
-
-    /// Reads a stream as far as its first row, and nothing that it would have to wait for.
+impl TextReader {
+    /// Reads a stream as far as its first row, and nothing that it would have to wait for: it may be a pipe on which the next row
+    /// is yet to come. For [`stream`](TextReader::stream).
     pub(super) fn start_live(mut source: Source, options: &Options) -> Result<Self, Error> {
         let lines = usize::from(options.header) + options.skip_rows + 1;
         let head = source.look_ahead(SIZES.row, |text| has_lines(text, lines, options.comment))?;
@@ -231,21 +217,19 @@ impl Reader {
             layout,
             mut current,
             mut next,
-            record,
+            mut record,
             mut position,
             line,
             ..
         } = self;
         let plan = Plan { layout, numbers, clock, fields, time: selection.time };
-        let mut workspace = Workspace::new(record);
         let mut rows = Rows::new(plan.fields.len(), line);
-        let mut parsed = 0;
         loop {
             let text = &current.text()[position..];
             let (whole, tail) = text.split_at(memrchr(b'\n', text).map_or(0, |newline| newline + 1));
-            let rows_before = rows.count;
+            let share = source.share_read();
             let (read, filled) = rayon::join(
-                || plan.read(whole, sizes.piece, &mut workspace, &mut rows),
+                || plan.read(whole, sizes.piece, share, &mut record, &mut rows),
                 || {
                     if current.is_last() {
                         return Ok(());
@@ -264,7 +248,7 @@ impl Reader {
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {
-                    let row = Row { record: &workspace.record, text: left, line: rows.line };
+                    let row = Row { record: &record, text: left, line: rows.line };
                     return Err(plan.layout.unclosed(&row));
                 }
                 progress(source.bytes_read(), source.total());
@@ -276,12 +260,6 @@ impl Reader {
             filled?;
             next.prepend(&whole[taken..]);
             progress(source.bytes_read(), source.total());
-            parsed += taken;
-            if let Some(share) = source.share_read() {
-                // What is in the next block is read, but not parsed.
-                let share = share * parsed as f64 / (parsed + next.text().len()) as f64;
-                rows.make_room((rows.count as f64 / share * 1.01) as usize, rows.count - rows_before);
-            }
             std::mem::swap(&mut current, &mut next);
             position = 0;
         }
@@ -295,7 +273,7 @@ impl Reader {
         selection: &Selection,
         whole_lines: bool,
         start: Option<&str>,
-    ) -> Result<Stream, Error> {
+    ) -> Result<TextStream, Error> {
         let fields = self.fields(selection)?;
         let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
         let (mut clock, mut first) = self.clock(selection, &numbers)?;
@@ -307,7 +285,7 @@ impl Reader {
         let Self { source, layout, current, position, line, .. } = self;
         let text = current.raw().get(position..).unwrap_or_default().to_vec();
         let plan = Plan { layout, numbers, clock, fields, time: selection.time };
-        Ok(Stream::begin(plan, selection, Text { text, line, source, whole_lines, start: first }))
+        Ok(TextStream::begin(plan, selection, Text { text, line, source, whole_lines, start: first }))
     }
 
     /// The selected fields in ascending order, if the selection makes sense.

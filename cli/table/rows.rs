@@ -34,13 +34,13 @@ pub(super) struct Plan {
     pub(super) time: Option<usize>,
 }
 
-/// The rows of a table, or of a piece of it, by columns.
+/// The rows of a table, by columns.
 #[derive(Default)]
 pub(super) struct Rows {
-    /// The values of each field in the plan.
-    pub(super) columns: Vec<Vec<f64>>,
+    /// The values of each field in the plan; those after the last row are room for more.
+    columns: Vec<Vec<f64>>,
     /// The lines of the rows.
-    pub(super) lines: Lines,
+    lines: Lines,
     /// The number of rows.
     pub(super) count: usize,
     /// The number of the line after the last one read.
@@ -56,63 +56,76 @@ impl Rows {
     /// Adds a row that takes this many lines.
     fn push(&mut self, values: &[f64], lines: u64) {
         for (column, &value) in self.columns.iter_mut().zip(values) {
-            column.push(value);
+            column[self.count] = value;
         }
         self.lines.push(self.count, self.line);
         self.count += 1;
         self.line += lines;
     }
 
-    /// Adds the rows of the piece that follows, whose lines count from zero.
-    fn append(&mut self, piece: &Self) {
-        for (column, values) in self.columns.iter_mut().zip(&piece.columns) {
-            column.extend_from_slice(values);
-        }
-        self.lines.append(&piece.lines, self.count, self.line);
-        self.count += piece.count;
-        self.line += piece.line;
-    }
-
-    /// Makes room for a total of rows if the next `more` rows may not fit.
+    /// Makes room for `more` rows; in all there will be about `total`.
     ///
-    /// Growing by doubling would hold half as much again as the table needs.
-    pub(super) fn make_room(&mut self, total: usize, more: usize) {
+    /// Growing by doubling would hold half as much again as the table needs. The first memory comes as zeros from the system,
+    /// so that only what is written to is there, and the threads that write to it share the work of getting it.
+    fn make_room(&mut self, more: usize, total: usize) {
+        let needed = self.count + more;
+        let total = total.max(needed);
         for column in &mut self.columns {
-            if column.capacity() - column.len() < 2 * more {
+            if column.len() < needed {
                 // Only an estimate: without the memory for it the table may still fit.
-                let _ = column.try_reserve_exact(total.saturating_sub(column.len()));
+                let is_there = column.try_reserve_exact(total - column.len()).is_ok();
+                if column.is_empty() && is_there {
+                    *column = Vec::new();
+                    *column = vec![0.0; total];
+                } else {
+                    column.resize(needed, 0.0);
+                }
             }
         }
     }
 
-    /// Forgets everything, keeping the memory.
-    fn clear(&mut self) {
-        self.columns.iter_mut().for_each(Vec::clear);
-        self.lines.clear();
-        self.count = 0;
-        self.line = 0;
+    /// The room for `more` rows after the last one, of each column.
+    fn room(&mut self, more: usize) -> Vec<&mut [f64]> {
+        let rows = self.count..self.count + more;
+        self.columns.iter_mut().map(|column| &mut column[rows.clone()]).collect()
+    }
+
+    /// Adds rows that were written into the room from `start` on.
+    fn append(&mut self, start: usize, piece: &Read) {
+        if start > self.count {
+            for column in &mut self.columns {
+                column.copy_within(start..start + piece.rows, self.count);
+            }
+        }
+        self.lines.append(&piece.lines, self.count, self.line);
+        self.count += piece.rows;
+        self.line += piece.line;
     }
 }
 
-/// What reading a text takes besides the text, kept from one to the next.
-pub(super) struct Workspace {
-    /// For the careful reader.
-    pub(super) record: Record,
-    /// For the fast reader, one each.
-    pieces: Vec<Rows>,
+/// A piece of a text, and where its rows go.
+struct Piece<'a> {
+    text: &'a [u8],
+    /// As many values of each column as there are lines.
+    columns: Vec<&'a mut [f64]>,
 }
 
-impl Workspace {
-    /// Space for a plan's rows.
-    pub(super) fn new(record: Record) -> Self {
-        Self { record, pieces: Vec::new() }
-    }
+/// What was read of a piece.
+#[derive(Default)]
+struct Read {
+    /// The length of its text.
+    length: usize,
+    rows: usize,
+    /// Their lines, counted from zero, and the one after the last.
+    lines: Lines,
+    line: u64,
 }
 
 impl Plan {
     /// Makes a table of the rows, its columns in the order of the selection.
     pub(super) fn table(&self, mut rows: Rows, selection: &Selection, start: Option<String>) -> Table {
         let place = |field: &usize| self.fields.binary_search(field).unwrap_or_default();
+        rows.columns.iter_mut().for_each(|column| column.truncate(rows.count));
         let mut take = |field| rows.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
         Table {
             columns: selection.columns.iter().map(&mut take).collect(),
@@ -120,59 +133,70 @@ impl Plan {
             start,
             rows: rows.count,
             lines: rows.lines,
+            words: Vec::new(),
         }
     }
 
     /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about
-    /// `piece_size` bytes.
+    /// `piece_size` bytes. The text is about this `share` of all there is from the first row on, with what was read before;
+    /// none if nobody knows.
     ///
     /// Returns how much of the text was read: all of it, unless a quoted field goes on after it.
     pub(super) fn read(
         &self,
         text: &[u8],
         piece_size: usize,
-        workspace: &mut Workspace,
+        share: Option<f64>,
+        record: &mut Record,
         rows: &mut Rows,
     ) -> Result<usize, Error> {
         let texts = pieces(text, piece_size);
-        let columns = self.fields.len();
-        workspace.pieces.resize_with(texts.len().max(workspace.pieces.len()), || Rows::new(columns, 0));
-        let read: Vec<usize> = texts
-            .par_iter()
-            .zip(&mut workspace.pieces)
-            .map(|(text, rows)| {
-                rows.clear();
-                self.read_fast(text, rows)
-            })
-            .collect();
-        let mut taken = 0;
-        for ((text, piece), read) in texts.iter().zip(&workspace.pieces).zip(read) {
-            rows.append(piece);
-            taken += read;
-            if read < text.len() {
+        // No row is shorter than a line.
+        let counts: Vec<usize> = texts.par_iter().map(|text| memchr_iter(b'\n', text).count()).collect();
+        let most = counts.iter().sum();
+        let total = share.map_or(0, |share| ((rows.count + most) as f64 / share * 1.01) as usize);
+        rows.make_room(most, total);
+        let mut room = rows.room(most);
+        let mut cut = |count: usize| {
+            room.iter_mut().map(|room| room.split_off_mut(..count).unwrap_or_default()).collect()
+        };
+        let pieces: Vec<Piece<'_>> =
+            texts.iter().zip(&counts).map(|(text, &count)| Piece { text, columns: cut(count) }).collect();
+        let read: Vec<Read> = pieces.into_par_iter().map(|piece| self.read_fast(piece)).collect();
+        let (mut taken, mut start) = (0, rows.count);
+        for ((text, count), read) in texts.iter().zip(counts).zip(read) {
+            rows.append(start, &read);
+            start += count;
+            taken += read.length;
+            if read.length < text.len() {
                 break;
             }
         }
-        Ok(taken + self.read_carefully(&text[taken..], &mut workspace.record, rows)?)
+        Ok(taken + self.read_carefully(&text[taken..], record, rows)?)
     }
 
-    /// Reads rows up to the first that needs care, and returns the length of their text.
-    fn read_fast(&self, text: &[u8], rows: &mut Rows) -> usize {
+    /// Reads rows up to the first that needs care.
+    fn read_fast(&self, piece: Piece<'_>) -> Read {
+        let Piece { text, mut columns } = piece;
         let mut values = vec![0.0; self.fields.len()];
-        let mut taken = 0;
-        while taken < text.len() {
-            let rest = &text[taken..];
+        let mut read = Read::default();
+        while read.length < text.len() {
+            let rest = &text[read.length..];
             if let Some(length) = self.layout.dialect.skipped_line(rest) {
-                rows.line += 1;
-                taken += length;
+                read.length += length;
             } else if let Some(length) = self.row(rest, &mut values) {
-                rows.push(&values, 1);
-                taken += length;
+                for (column, &value) in columns.iter_mut().zip(&values) {
+                    column[read.rows] = value;
+                }
+                read.lines.push(read.rows, read.line);
+                read.rows += 1;
+                read.length += length;
             } else {
                 break;
             }
+            read.line += 1;
         }
-        taken
+        read
     }
 
     /// Reads the row at the front of a text and returns its length, unless it needs care.

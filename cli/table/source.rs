@@ -1,4 +1,4 @@
-//! Where the bytes come from: a file or standard input, unpacked and decoded to UTF-8.
+//! Where the bytes come from: a file or standard input, unpacked, and decoded to UTF-8 where they are text.
 
 use std::fs::File;
 use std::io::{self, Cursor, Read};
@@ -17,23 +17,53 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// What is asked of a pipe at once: as much as it holds.
 const PIECE: usize = 1 << 16;
 
-/// A stream of text, and how much of its origin has been read.
-pub(super) struct Source {
+/// What the first bytes of a log say that it is, if it is no text.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Format {
+    Parquet,
+    EncryptedParquet,
+    ArrowFile,
+    ArrowStream,
+    Feather1,
+}
+
+impl Format {
+    /// The first bytes of each. Those of a stream are the mark before each of its messages, and no text in any encoding.
+    const MARKS: [(&[u8], Self); 5] = [
+        (b"PAR1", Self::Parquet),
+        (b"PARE", Self::EncryptedParquet),
+        (b"ARROW1", Self::ArrowFile),
+        (&[0xff; 4], Self::ArrowStream),
+        (b"FEA1", Self::Feather1),
+    ];
+
+    /// The format that begins with these bytes.
+    fn of(start: &[u8]) -> Option<Self> {
+        Self::MARKS.into_iter().find(|(mark, _)| start.starts_with(mark)).map(|(_, format)| format)
+    }
+
+    /// Whether these bytes may be the beginning of a mark.
+    fn may_begin(start: &[u8]) -> bool {
+        Self::MARKS.iter().any(|(mark, _)| mark.len() > start.len() && mark.starts_with(start))
+    }
+}
+
+/// A stream of bytes, unpacked, and how much of its origin has been read.
+pub(super) struct Bytes {
     name: String,
-    text: Box<dyn Read + Send>,
+    bytes: Box<dyn Read + Send>,
     gzip: bool,
     bytes_read: Arc<AtomicU64>,
     total: Option<u64>,
+    /// What its first bytes say that it is; none for text.
+    pub(super) format: Option<Format>,
 }
 
-impl Source {
+impl Bytes {
     /// Opens a file, or standard input for `-`.
-    ///
-    /// gzip is known by its first bytes and UTF-16 by its byte-order mark; a mark also overrules `encoding`.
-    /// Without either, the bytes are passed on as they are.
-    pub(super) fn open(path: &Path, encoding: Option<&'static Encoding>) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
         if path == Path::new("-") {
-            return Self::new("standard input", io::stdin(), None, encoding);
+            return Self::new("standard input", io::stdin(), None);
         }
         let name = path.display().to_string();
         let opened = File::open(path).and_then(|file| {
@@ -50,17 +80,16 @@ impl Source {
             }
             Ok((file, metadata)) => {
                 let total = metadata.is_file().then_some(metadata.len());
-                Self::new(&name, file, total, encoding)
+                Self::new(&name, file, total)
             }
         }
     }
 
-    /// Unpacks and decodes a stream of `total` bytes.
+    /// Unpacks a stream of `total` bytes. gzip is known by its first bytes, and so are formats that are no text.
     pub(super) fn new(
         name: &str,
         origin: impl Read + Send + 'static,
         total: Option<u64>,
-        encoding: Option<&'static Encoding>,
     ) -> Result<Self, Error> {
         let bytes_read = Arc::new(AtomicU64::new(0));
         let mut origin = Counted { origin, bytes: Arc::clone(&bytes_read) };
@@ -68,8 +97,62 @@ impl Source {
         let peeked = origin.by_ref().take(GZIP.len() as u64).read_to_end(&mut start);
         let gzip = start == GZIP;
         let origin = Cursor::new(start).chain(origin);
-        let unpacked: Box<dyn Read + Send> =
+        let mut unpacked: Box<dyn Read + Send> =
             if gzip { Box::new(MultiGzDecoder::new(origin)) } else { Box::new(origin) };
+        // No more than it takes to know: a log that is still being written may have no more.
+        let mut start = Vec::new();
+        let looked_at = peeked.and_then(|_| {
+            while Format::may_begin(&start) && unpacked.by_ref().take(1).read_to_end(&mut start)? > 0 {}
+            Ok(())
+        });
+        let format = Format::of(&start);
+        let bytes: Box<dyn Read + Send> =
+            if start.is_empty() { unpacked } else { Box::new(Cursor::new(start).chain(unpacked)) };
+        let bytes = Self { name: name.to_owned(), bytes, gzip, bytes_read, total, format };
+        match looked_at {
+            Ok(()) => Ok(bytes),
+            Err(error) => Err(failure(&bytes.name, gzip, &error)),
+        }
+    }
+
+    /// The name that messages give it.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Whether it was unpacked.
+    #[cfg(feature = "columnar")]
+    pub(super) fn is_gzip(&self) -> bool {
+        self.gzip
+    }
+
+    /// How much of it was read, whenever it is asked, as it is stored, and of how much; that is not known of a stream.
+    #[cfg(feature = "columnar")]
+    pub(super) fn progress(&self) -> (Arc<AtomicU64>, Option<u64>) {
+        (Arc::clone(&self.bytes_read), self.total)
+    }
+
+    /// The bytes themselves.
+    #[cfg(feature = "columnar")]
+    pub(super) fn into_reader(self) -> Box<dyn Read + Send> {
+        self.bytes
+    }
+}
+
+/// A stream of text, and how much of its origin has been read.
+pub(super) struct Source {
+    name: String,
+    text: Box<dyn Read + Send>,
+    gzip: bool,
+    bytes_read: Arc<AtomicU64>,
+    total: Option<u64>,
+}
+
+impl Source {
+    /// Decodes a stream of bytes. UTF-16 is known by its byte-order mark; a mark also overrules `encoding`. Without either,
+    /// the bytes are passed on as they are.
+    pub(super) fn new(bytes: Bytes, encoding: Option<&'static Encoding>) -> Self {
+        let Bytes { name, bytes, gzip, bytes_read, total, .. } = bytes;
         // Decoding UTF-8 to UTF-8 would take time and hide what is wrong with it.
         let encoding = encoding.filter(|&encoding| encoding != UTF_8);
         let text = DecodeReaderBytesBuilder::new()
@@ -77,12 +160,8 @@ impl Source {
             .utf8_passthru(encoding.is_none())
             .strip_bom(true)
             .bom_override(true)
-            .build(unpacked);
-        let source = Self { name: name.to_owned(), text: Box::new(text), gzip, bytes_read, total };
-        match peeked {
-            Ok(_) => Ok(source),
-            Err(error) => Err(source.failure(&error)),
-        }
+            .build(bytes);
+        Self { name, text: Box::new(text), gzip, bytes_read, total }
     }
 
     /// The name that messages give it.
@@ -147,17 +226,22 @@ impl Source {
 
     /// Says what a failed read means.
     fn failure(&self, error: &io::Error) -> Error {
-        let message = match error.kind() {
-            io::ErrorKind::UnexpectedEof if self.gzip => {
-                "the gzip stream ends too early: the file is truncated; copy or compress it again".to_owned()
-            }
-            io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData if self.gzip => {
-                format!("the gzip stream is damaged ({error}); copy or compress it again")
-            }
-            _ => format!("cannot be read: {error}"),
-        };
-        Error::io(&self.name, message)
+        failure(&self.name, self.gzip, error)
     }
+}
+
+/// Says what a failed read means.
+fn failure(name: &str, gzip: bool, error: &io::Error) -> Error {
+    let message = match error.kind() {
+        io::ErrorKind::UnexpectedEof if gzip => {
+            "the gzip stream ends too early: the file is truncated; copy or compress it again".to_owned()
+        }
+        io::ErrorKind::InvalidInput | io::ErrorKind::InvalidData if gzip => {
+            format!("the gzip stream is damaged ({error}); copy or compress it again")
+        }
+        _ => format!("cannot be read: {error}"),
+    };
+    Error::io(name, message)
 }
 
 /// A stream that counts its bytes.

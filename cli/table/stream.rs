@@ -1,6 +1,6 @@
-//! A log read row by row, as it comes: a file to its end, or a pipe that someone is still writing to.
+//! A text read row by row, as it comes: a file to its end, or a pipe that someone is still writing to.
 
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, channel, sync_channel};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
 use std::thread;
 
 use memchr::memchr;
@@ -8,55 +8,21 @@ use memchr::memchr;
 use super::Selection;
 use super::error::Error;
 use super::layout::Row;
+use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::record::Record;
 use super::rows::Plan;
 use super::source::Source;
 
 /// What is read at once, at most. A pipe gives less.
 const PIECE: usize = 1 << 16;
-/// How many pieces may wait to be parsed.
-const WAITING: usize = 4;
 /// The longest line.
 const LONGEST: usize = 1 << 24;
 
-/// What comes next.
-#[derive(Debug)]
-pub(crate) enum Event {
-    /// A row: [`Stream::values`] and [`Stream::time`] are its own.
-    Row,
-    /// A line that is no row. It was left out.
-    Malformed(Error),
-    /// There is nothing more at the moment: the next call waits. Told once each time.
-    Idle,
-    /// The log ends here.
-    End,
-    /// The program was asked to end.
-    Stopped,
-}
-
-/// What the thread that reads, and whoever ends the stream, tell the one that parses.
-enum Message {
-    Text(Vec<u8>),
-    Failed(Error),
-    End,
-    Stop,
-}
-
-/// Ends a stream from another thread: it wakes if it waits.
-pub(crate) struct Waker(SyncSender<Message>);
-
-impl Waker {
-    pub(crate) fn wake(&self) {
-        // If that many pieces wait, then it does not.
-        let _ = self.0.try_send(Message::Stop);
-    }
-}
-
-/// A log of which the rows are read one after the other. Memory does not grow with their number.
+/// A text of which the rows are read one after the other. Memory does not grow with their number.
 ///
 /// A thread of its own reads the text, so that a row is parsed as soon as its line break is there. Every line is a row:
 /// a quoted field does not reach beyond it.
-pub(crate) struct Stream {
+pub(crate) struct TextStream {
     plan: Plan,
     record: Record,
     /// The values of the row at hand by ascending field, and in the order of the selection.
@@ -76,9 +42,7 @@ pub(crate) struct Stream {
     whole_lines: bool,
     start: Option<String>,
     ended: bool,
-    told: bool,
-    messages: Receiver<Message>,
-    sender: SyncSender<Message>,
+    mailbox: Mailbox<Vec<u8>>,
     spent: Sender<Vec<u8>>,
 }
 
@@ -95,12 +59,12 @@ pub(super) struct Text {
     pub(super) start: Option<String>,
 }
 
-impl Stream {
+impl TextStream {
     pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Self {
         let Text { text, line, source, whole_lines, start } = text;
-        let (sender, messages) = sync_channel(WAITING);
+        let mailbox = Mailbox::new();
         let (spent, empty) = channel();
-        let pieces = sender.clone();
+        let pieces = mailbox.sender();
         thread::spawn(move || read(source, &pieces, &empty));
         let place = |field: &usize| plan.fields.binary_search(field).unwrap_or_default();
         Self {
@@ -118,16 +82,14 @@ impl Stream {
             whole_lines,
             start,
             ended: false,
-            told: false,
-            messages,
-            sender,
+            mailbox,
             spent,
         }
     }
 
     /// What ends this stream early.
     pub(crate) fn waker(&self) -> Waker {
-        Waker(self.sender.clone())
+        self.mailbox.waker()
     }
 
     /// The time that dates count from, as it is written; none if times are numbers.
@@ -162,36 +124,28 @@ impl Stream {
     pub(crate) fn next(&mut self) -> Result<Event, Error> {
         loop {
             if let Some(event) = self.parse()? {
-                self.told = false;
+                self.mailbox.forget();
                 return Ok(event);
             }
             if self.ended {
                 return Ok(Event::End);
             }
-            let message = match self.messages.try_recv() {
-                Err(TryRecvError::Empty) if !self.told => {
-                    self.told = true;
-                    return Ok(Event::Idle);
+            match self.mailbox.take() {
+                None => return Ok(Event::Idle),
+                Some(Message::Failed(error)) => return Err(error),
+                Some(Message::Stop) => return Ok(Event::Stopped),
+                Some(Message::End) => {
+                    self.ended = true;
+                    if !self.whole_lines && self.position < self.text.len() {
+                        self.text.push(b'\n');
+                    }
                 }
-                Err(TryRecvError::Empty) => self.messages.recv().unwrap_or(Message::End),
-                Err(TryRecvError::Disconnected) => Message::End,
-                Ok(message) => message,
-            };
-            match message {
-                Message::Text(piece) => {
+                Some(Message::Piece(piece)) => {
                     self.text.drain(..self.position);
                     self.position = 0;
                     self.text.extend_from_slice(&piece);
                     // The thread may have ended; then nobody needs the memory.
                     let _ = self.spent.send(piece);
-                }
-                Message::Failed(error) => return Err(error),
-                Message::Stop => return Ok(Event::Stopped),
-                Message::End => {
-                    self.ended = true;
-                    if !self.whole_lines && self.position < self.text.len() {
-                        self.text.push(b'\n');
-                    }
                 }
             }
         }
@@ -241,7 +195,7 @@ impl Stream {
 }
 
 /// Reads a text to its end, or until nobody takes it.
-fn read(mut source: Source, pieces: &SyncSender<Message>, empty: &Receiver<Vec<u8>>) {
+fn read(mut source: Source, pieces: &SyncSender<Message<Vec<u8>>>, empty: &Receiver<Vec<u8>>) {
     loop {
         let mut piece = empty.try_recv().unwrap_or_default();
         piece.resize(PIECE, 0);
@@ -249,11 +203,11 @@ fn read(mut source: Source, pieces: &SyncSender<Message>, empty: &Receiver<Vec<u
             Ok(0) => Message::End,
             Ok(count) => {
                 piece.truncate(count);
-                Message::Text(piece)
+                Message::Piece(piece)
             }
             Err(error) => Message::Failed(error),
         };
-        let goes_on = matches!(message, Message::Text(_));
+        let goes_on = matches!(message, Message::Piece(_));
         if pieces.send(message).is_err() || !goes_on {
             return;
         }

@@ -7,8 +7,8 @@ use encoding_rs::{Encoding, UTF_16LE, WINDOWS_1252};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::reader::{SIZES, Sizes};
-use super::source::Source;
+use super::reader::{SIZES, Sizes, TextReader};
+use super::source::{Bytes, Source};
 use super::*;
 
 mod random;
@@ -21,10 +21,9 @@ fn sizes(block: usize, piece: usize) -> Sizes {
     Sizes { block, piece, ..SIZES }
 }
 
-fn start(bytes: &[u8], options: &Options, sizes: Sizes) -> Result<Reader, Error> {
-    let source =
-        Source::new("log.csv", Cursor::new(bytes.to_vec()), Some(bytes.len() as u64), options.encoding)?;
-    Reader::start(source, options, sizes)
+fn start(bytes: &[u8], options: &Options, sizes: Sizes) -> Result<TextReader, Error> {
+    let bytes = Bytes::new("log.csv", Cursor::new(bytes.to_vec()), Some(bytes.len() as u64))?;
+    TextReader::start(Source::new(bytes, options.encoding), options, sizes)
 }
 
 /// Reads all columns, the first as time if so said.
@@ -524,8 +523,8 @@ impl Read for Breaking {
 fn a_stream_that_breaks_off() {
     let read = |text: &str| {
         let stream = Breaking { bytes: Cursor::new(text.as_bytes().to_vec()), interrupt: false };
-        let source = Source::new("stream", stream, None, None)?;
-        let reader = Reader::start(source, &comma(), sizes(16, 8))?;
+        let source = Source::new(Bytes::new("stream", stream, None)?, None);
+        let reader = TextReader::start(source, &comma(), sizes(16, 8))?;
         reader.read(&Selection { columns: vec![0, 1], time: None }, &mut |_, _| {})
     };
     let text = "u,y\n1,2\n3,4\n5,6\n7,8\n9,10\n".to_owned();

@@ -57,7 +57,7 @@ impl Clock {
 }
 
 /// The message for a time that is not there.
-const MISSING: &str = "the time is missing; fill it in, or take the row out";
+pub(super) const MISSING: &str = "the time is missing; fill it in, or take the row out";
 
 /// Reads a date and time of day; one without an offset is in UTC.
 fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {

@@ -271,7 +271,7 @@ impl Place {
     }
 
     /// What the row at hand is to the state.
-    pub(super) fn of_row(&mut self, state: &State, live: &Live, file: &str) -> Result<RowPlace, Failure> {
+    pub(super) fn of_row(&mut self, state: &State, live: &Live) -> Result<RowPlace, Failure> {
         let is = |known: &[Option<f64>]| print(live.values(), live.time()).eq(known.iter().copied());
         if *self == Self::Unknown {
             *self = if is(&state.first) { Self::After } else { Self::Beyond };
@@ -281,9 +281,9 @@ impl Place {
                 let row = live.row();
                 if row == 1 && !is(&state.first) || row == state.rows && !is(&state.last) {
                     return Err(Failure::data(format!(
-                        "{file}:{}: this is not row {row} of the log that the state is of; give that log, say --resume now \
+                        "{}: this is not row {row} of the log that the state is of; give that log, say --resume now \
                          if this is a pipe that has moved on, or remove the state to start anew",
-                        live.line()
+                        live.place()
                     )));
                 }
                 if row == state.rows {

@@ -2,12 +2,13 @@ use std::io::{self, Cursor, Read};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use super::{comma, gzip, plain};
-use crate::table::reader::Reader;
-use crate::table::source::Source;
-use crate::table::{Event, Options, Selection, Stream};
+use crate::table::reader::TextReader;
+use crate::table::source::{Bytes, Source};
+use crate::table::stream::TextStream;
+use crate::table::{Event, Options, Selection};
 
 /// What a stream gave: rows as they are, errors as they read.
-fn all(mut stream: Stream) -> Vec<String> {
+fn all(mut stream: TextStream) -> Vec<String> {
     let mut events = Vec::new();
     loop {
         match stream.next() {
@@ -24,11 +25,12 @@ fn all(mut stream: Stream) -> Vec<String> {
     }
 }
 
-fn opened(origin: impl Read + Send + 'static, options: &Options) -> Reader {
-    Reader::start_live(Source::new("log.csv", origin, None, None).unwrap(), options).unwrap()
+fn opened(origin: impl Read + Send + 'static, options: &Options) -> TextReader {
+    let bytes = Bytes::new("log.csv", origin, None).unwrap();
+    TextReader::start_live(Source::new(bytes, options.encoding), options).unwrap()
 }
 
-fn streamed(origin: impl Read + Send + 'static, options: &Options, whole_lines: bool) -> Stream {
+fn streamed(origin: impl Read + Send + 'static, options: &Options, whole_lines: bool) -> TextStream {
     let selection = Selection { columns: vec![1, 0], time: None };
     opened(origin, options).stream(&selection, whole_lines, None).unwrap()
 }
@@ -176,8 +178,8 @@ fn times_are_those_of_a_whole_log() {
 #[test]
 fn a_log_without_rows_or_that_breaks_off_says_so() {
     let refused = |text: &'static [u8]| {
-        let source = Source::new("log.csv", Cursor::new(text), None, None).unwrap();
-        Reader::start_live(source, &plain()).map(drop).unwrap_err().to_string()
+        let source = Source::new(Bytes::new("log.csv", Cursor::new(text), None).unwrap(), None);
+        TextReader::start_live(source, &plain()).map(drop).unwrap_err().to_string()
     };
     assert!(refused(b"").ends_with("the file is empty; record at least one row"));
     assert!(refused(b"u,y\n").contains("there are no data rows below the header"));

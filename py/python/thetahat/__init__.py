@@ -1,6 +1,6 @@
 """System identification: models of dynamic systems from logged data.
 
-A log holds measured signals (`Log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
+A log holds measured signals (`Log`, `read_log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
 `fir`, `iv`, `sriv`), `search` chooses one, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
@@ -26,7 +26,7 @@ from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, gene
 from thetahat._grey_box import GreyBox, grey
 from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
 from thetahat._instrumental import iv, sriv
-from thetahat._log import Log, dc_motor, read_csv
+from thetahat._log import Log, dc_motor, read_csv, read_log
 from thetahat._many import Fits, fit_many
 from thetahat._model import Model
 from thetahat._narx import narx
@@ -160,6 +160,7 @@ __all__ = [
     "pole_placement",
     "process",
     "read_csv",
+    "read_log",
     "search",
     "spectrum",
     "sriv",

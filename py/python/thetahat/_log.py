@@ -54,7 +54,7 @@ class Log:
 
     See Also
     --------
-    read_csv : A log from a file.
+    read_log : A log from a file.
 
     Examples
     --------
@@ -513,7 +513,90 @@ def read_csv(
     ...     log = th.read_csv(path, time="t")
     >>> log
     Log(3 rows, inputs u, output y, sample time 0.5 s by column 't')
+
+    See Also
+    --------
+    read_log : A log in a file of any format.
     """
+    return _read(path, inputs, output, locals(), uniform=uniform)
+
+
+def read_log(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    *,
+    inputs: Sequence[str] | str | None = None,
+    output: str | Sequence[str] | None = None,
+    time: str | None = None,
+    sample_time: Duration | None = None,
+    resample: Resample | None = None,
+    uniform: bool = True,
+) -> Log:
+    """Read a log from a Parquet or an Arrow file, or from CSV, as the command line does.
+
+    The format is known by the first bytes. Of Parquet and Arrow only the columns that are named are unpacked, batch by batch: memory
+    does not hold the file.
+
+    Parameters
+    ----------
+    path : str or path, or a sequence of them
+        The file: Parquet, an Arrow file or stream (IPC, Feather 2), or CSV, gzip-compressed or not. Several files are several
+        experiments with one plant.
+    inputs : sequence of str, or str, optional
+        The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.
+    output : str or sequence of str, optional
+        The column that is the output, or those that are: y, unless said otherwise.
+    time : str, optional
+        The column that holds the times: instants, dates or durations, seconds, or texts of dates.
+    sample_time, resample
+        As for `Log`.
+    uniform : bool, default True
+        Whether the steps of the clock have to be even. Models in equations take any.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it is damaged, a column is not there or holds no numbers, or a value is infinite: with file, column and row.
+
+    Warns
+    -----
+    UserWarning
+        For what may be meant otherwise, such as a column of times that is not named, and for whole numbers beyond 2^53, which are rounded.
+
+    See Also
+    --------
+    read_csv : With the options of text.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> import polars as pl
+    >>> import thetahat as th
+    >>> frame = pl.DataFrame({"u": [1, 1, 1], "y": [0.0, 0.5, 0.75], "when": [0, 500, 1000]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = pathlib.Path(folder, "log.parquet")
+    ...     frame.with_columns(pl.col("when").cast(pl.Datetime("ms"))).write_parquet(path)
+    ...     log = th.read_log(path, time="when")
+    >>> log
+    Log(3 rows, inputs u, output y, sample time 0.5 s by column 'when')
+    """
+    return _read(path, inputs, output, locals(), uniform=uniform)
+
+
+def _read(
+    path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
+    inputs: Sequence[str] | str | None,
+    output: str | Sequence[str] | None,
+    options: Mapping[str, Any],
+    *,
+    uniform: bool,
+) -> Log:
+    """A log from files, read with those of `ReadOptions` that are there."""
     outputs = None if output is None else _names("output", output)
     if outputs is not None and len(outputs) > 1:
         # Read as inputs, they get their role afterwards.
@@ -521,7 +604,7 @@ def read_csv(
         words = [*_options.channels([*chosen, *outputs[:-1]], outputs[-1])]
     else:
         words = [*_options.channels(inputs, None if outputs is None else outputs[0])]
-    words += _options.words(ReadOptions, locals())
+    words += _options.words(ReadOptions, options)
     paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
     if not paths:
         raise ValueError("path: there is none; give at least one")
@@ -532,9 +615,10 @@ def read_csv(
     if outputs is not None and len(outputs) > 1:
         log = log.select([] if inputs is None else _names("inputs", inputs), outputs)
     for note in notes:
-        _said.warn(note, stacklevel=2)
-    said = "assumed" if time is None and sample_time is None else "" if time is None else f"by column {time!r}"
-    return Log._of(log, Clock(said if resample is None else f"{said}, resampled"))
+        _said.warn(note, stacklevel=3)
+    time = options.get("time")
+    said = "assumed" if time is None and options.get("sample_time") is None else "" if time is None else f"by column {time!r}"
+    return Log._of(log, Clock(said if options.get("resample") is None else f"{said}, resampled"))
 
 
 def dc_motor() -> Log:

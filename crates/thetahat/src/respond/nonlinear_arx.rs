@@ -15,8 +15,9 @@ mod errors;
 mod runner;
 
 use std::borrow::Cow;
-use std::cell::{Cell, OnceCell};
 use std::ops::Range;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
@@ -83,10 +84,10 @@ pub(crate) struct NonlinearArxOnLog<'l> {
     /// What predictions look at, in which the other outputs stand after the inputs, and what free runs do.
     ahead: Record<'l>,
     free_run: Record<'l>,
-    one_step: OnceCell<Vec<Response>>,
+    one_step: OnceLock<Vec<Response>>,
     /// Whether outputs that are fed back are kept within the range of the estimation rows, and in how many samples they were.
     clamp: bool,
-    clamped: Cell<usize>,
+    clamped: AtomicUsize,
 }
 
 impl<'l> NonlinearArxOnLog<'l> {
@@ -118,9 +119,9 @@ impl<'l> NonlinearArxOnLog<'l> {
             signals,
             ahead,
             free_run,
-            one_step: OnceCell::new(),
+            one_step: OnceLock::new(),
             clamp: false,
-            clamped: Cell::new(0),
+            clamped: AtomicUsize::new(0),
         })
     }
 
@@ -236,7 +237,7 @@ impl<'l> NonlinearArxOnLog<'l> {
                 response.counted.extend(measured(self.signals.outputs[i], &rows));
             }
         }
-        self.clamped.set(clamped);
+        self.clamped.store(clamped, Ordering::Relaxed);
         responses
     }
 }
@@ -451,6 +452,6 @@ impl OnLog for NonlinearArxOnLog<'_> {
     }
 
     fn clamped(&self) -> Option<usize> {
-        self.clamp.then(|| self.clamped.get())
+        self.clamp.then(|| self.clamped.load(Ordering::Relaxed))
     }
 }

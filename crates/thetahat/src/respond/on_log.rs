@@ -1,7 +1,7 @@
 //! What a model says of the rows of a log, whatever its kind: all that its figures, tests and pages rest on.
 
 use std::borrow::Cow;
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use super::forecast::forecast_if_possible;
 use super::innovations::{Innovations, innovations};
@@ -15,7 +15,7 @@ use crate::model::{PolynomialModel, Signal};
 /// A model beside a log of which its offsets were taken.
 ///
 /// Lists have an entry for each output, signals a value for each row of the log.
-pub(crate) trait OnLog {
+pub(crate) trait OnLog: Sync {
     /// The outputs.
     fn outputs(&self) -> &[Signal];
 
@@ -87,7 +87,7 @@ pub(crate) struct PolynomialOnLog<'l> {
     ahead: Record<'l>,
     start: InitialCondition,
     /// What is left one step ahead, once somebody asked.
-    innovations: OnceCell<Vec<Innovations>>,
+    innovations: OnceLock<Vec<Innovations>>,
     /// What free runs are made from.
     free_run: Record<'l>,
 }
@@ -110,14 +110,14 @@ impl<'l> PolynomialOnLog<'l> {
             model,
             ahead: record(one)?,
             start: start(one),
-            innovations: OnceCell::new(),
+            innovations: OnceLock::new(),
             free_run: record(Horizon::FreeRun)?,
         })
     }
 
     /// Predictions from another record, and start from something else.
     pub(crate) fn with_predictions(self, ahead: Record<'l>, start: InitialCondition) -> Self {
-        Self { ahead, start, innovations: OnceCell::new(), ..self }
+        Self { ahead, start, innovations: OnceLock::new(), ..self }
     }
 
     /// What is left one step ahead: predictions, their deviations and the tests rest on it, and it is computed once.

@@ -85,8 +85,8 @@ pub fn simulate(
         }
         let rows = first..segment.end;
         let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
-        let mut x = driven(model, &inputs, rows.len(), &Impulses::none(model));
-        let mut values = x.split_off(run.start - first);
+        let mut values = driven(model, &inputs, rows.len(), &Impulses::none(model));
+        values.drain(..run.start - first);
         if start == InitialCondition::Drop {
             let before = first..run.start;
             let (disturbance, errors) =

@@ -1,8 +1,8 @@
 //! A model in equations beside a log.
 
 use std::borrow::Cow;
-use std::cell::OnceCell;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use thetahat_core::Dual;
 
@@ -39,7 +39,7 @@ pub(crate) struct EquationsOnLog<'l> {
     rows: usize,
     sample_time: f64,
     /// What the filter says of each output.
-    filtered: OnceCell<Vec<Filtered>>,
+    filtered: OnceLock<Vec<Filtered>>,
 }
 
 /// The innovations of an output, as long as the log; NaN where nothing was measured.
@@ -96,7 +96,7 @@ impl<'l> EquationsOnLog<'l> {
             z,
             spread,
             experiments,
-            filtered: OnceCell::new(),
+            filtered: OnceLock::new(),
         })
     }
 

@@ -1,8 +1,8 @@
 //! A process beside a log.
 
 use std::borrow::Cow;
-use std::cell::OnceCell;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use super::held::{HeldLog, at_rest, held_logs, modes, sensitivities};
 use crate::Error;
@@ -24,7 +24,7 @@ pub(crate) struct ProcessOnLog<'l> {
     output: &'l [f64],
     /// The inputs, a missing value held.
     inputs: Vec<Vec<f64>>,
-    at_rest: OnceCell<Vec<f64>>,
+    at_rest: OnceLock<Vec<f64>>,
 }
 
 impl<'l> ProcessOnLog<'l> {
@@ -40,7 +40,7 @@ impl<'l> ProcessOnLog<'l> {
             }
         }
         let output = &log.channel(&model.output.name)?.values;
-        Ok(Self { model, parts: model.parts(), log, held, output, inputs, at_rest: OnceCell::new() })
+        Ok(Self { model, parts: model.parts(), log, held, output, inputs, at_rest: OnceLock::new() })
     }
 
     /// The response of a process that was at rest before the first row of each log.

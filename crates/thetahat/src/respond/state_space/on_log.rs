@@ -1,8 +1,8 @@
 //! A state-space model beside a log.
 
 use std::borrow::Cow;
-use std::cell::OnceCell;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
@@ -32,9 +32,9 @@ pub(crate) struct StateSpaceOnLog<'l> {
     free_runs: Vec<Range<usize>>,
     asked: Option<InitialCondition>,
     /// What is left one step ahead, once somebody asked.
-    innovations: OnceCell<Segments>,
+    innovations: OnceLock<Segments>,
     /// What an uncertain state adds to their variances, likewise.
-    added: OnceCell<Vec<Vec<f64>>>,
+    added: OnceLock<Vec<Vec<f64>>>,
 }
 
 /// The innovations of each output in each segment, and the state after the last.
@@ -85,7 +85,7 @@ impl<'l> StateSpaceOnLog<'l> {
             Some(covariance) => through_missing_outputs(covariance, &ahead.outputs, &free_runs),
             None => ahead.segments.clone(),
         };
-        let (innovations, added) = (OnceCell::new(), OnceCell::new());
+        let (innovations, added) = (OnceLock::new(), OnceLock::new());
         Ok(Self { model, matrices, ahead, segments, covariance, free_runs, asked, innovations, added })
     }
 

@@ -1,0 +1,280 @@
+//! Batches of rows from the files and streams that hold them.
+
+use std::cell::Cell;
+use std::fs::File;
+use std::io::{self, BufReader, Cursor, Read};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Once};
+
+use arrow_array::RecordBatch;
+use arrow_ipc::reader::{FileReader, StreamReader};
+use arrow_schema::{ArrowError, SchemaRef};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{
+    ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
+};
+
+use super::super::error::{Error, escaped};
+use super::super::source::{Bytes, Format};
+
+/// The rows of a batch of Parquet, at most. What Arrow writes comes as it was written.
+const BATCH: usize = 1 << 14;
+
+/// A format, with its article.
+pub(super) fn named(format: Format) -> &'static str {
+    match format {
+        Format::Parquet | Format::EncryptedParquet => "a Parquet file",
+        Format::ArrowFile => "an Arrow file",
+        Format::ArrowStream => "an Arrow stream",
+        Format::Feather1 => "a Feather file",
+    }
+}
+
+/// A file or stream whose schema was read.
+pub(super) enum Opened {
+    Parquet {
+        name: String,
+        file: File,
+        length: u64,
+        metadata: ArrowReaderMetadata,
+    },
+    File {
+        name: String,
+        file: File,
+        length: u64,
+    },
+    /// From the schema on.
+    Stream {
+        name: String,
+        bytes: Box<dyn Read + Send>,
+        bytes_read: Arc<AtomicU64>,
+        total: Option<u64>,
+    },
+}
+
+impl Opened {
+    pub(super) fn new(path: &Path, bytes: Bytes, format: Format) -> Result<(Self, SchemaRef), Error> {
+        let name = bytes.name().to_owned();
+        let refusal = |message: String| Err(Error::data(&name, None, message));
+        match format {
+            Format::EncryptedParquet => {
+                refusal("this Parquet file is encrypted; write it without encryption".to_owned())
+            }
+            Format::Feather1 => refusal(
+                "this is a Feather file of version 1; write it as version 2, which is an Arrow file"
+                    .to_owned(),
+            ),
+            Format::Parquet | Format::ArrowFile if path == Path::new("-") || bytes.progress().1.is_none() => {
+                refusal(format!(
+                    "{} is read from its end, where its directory is, so it cannot come through a pipe; name the file, or send an \
+                 Arrow stream",
+                    named(format)
+                ))
+            }
+            Format::Parquet | Format::ArrowFile if bytes.is_gzip() => refusal(format!(
+                "{} is read from its end, and this one was compressed as a whole; unpack it (gunzip)",
+                named(format)
+            )),
+            Format::Parquet => Self::parquet(path, name),
+            Format::ArrowFile => Self::file(path, name),
+            Format::ArrowStream => {
+                let (bytes_read, total) = bytes.progress();
+                // A message begins with a few bytes each.
+                let bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());
+                let mut kept = Kept { bytes, copy: Vec::new() };
+                let schema = guarded(|| StreamReader::try_new(&mut kept, None).map(|reader| reader.schema()))
+                    .map_err(|error| damaged(&name, 0, &error))?;
+                let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
+                Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
+            }
+        }
+    }
+
+    fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+        let (file, length) = opened(path, &name)?;
+        let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(&file), None)?.schema()))
+            .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
+        Ok((Self::File { name, file, length }, schema))
+    }
+
+    fn parquet(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+        let (file, length) = opened(path, &name)?;
+        let load = || Ok(ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?);
+        let metadata = guarded(load).map_err(|error| no_whole_file(&name, "Parquet", &error))?;
+        let schema = Arc::clone(metadata.schema());
+        Ok((Self::Parquet { name, file, length, metadata }, schema))
+    }
+
+    /// How many rows there are, if it is known.
+    pub(super) fn rows(&self) -> Option<usize> {
+        match self {
+            Self::Parquet { metadata, .. } => {
+                usize::try_from(metadata.metadata().file_metadata().num_rows()).ok()
+            }
+            Self::File { .. } | Self::Stream { .. } => None,
+        }
+    }
+
+    /// The rows of some columns, given in ascending order; an error is a message.
+    pub(super) fn batches(self, columns: &[usize]) -> Result<Batches, String> {
+        let rows = self.rows().unwrap_or(0) as u64;
+        let said = |error: ArrowError| format!("it cannot be read: {}", escaped(&error.to_string()));
+        let columns = columns.to_vec();
+        let (name, form) = match self {
+            Self::Parquet { name, file, length, metadata } => {
+                let mask = ProjectionMask::roots(metadata.parquet_schema(), columns);
+                let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
+                let build = || Ok(builder.with_projection(mask).with_batch_size(BATCH).build()?);
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::Parquet { reader, length, of: rows })
+            }
+            Self::File { name, file, length } => {
+                let build = || FileReader::try_new(BufReader::new(file), Some(columns));
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::File { reader, length, read: 0 })
+            }
+            Self::Stream { name, bytes, bytes_read, total } => {
+                let build = || StreamReader::try_new(bytes, Some(columns));
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::Stream { reader, bytes_read, total })
+            }
+        };
+        Ok(Batches { name, rows: 0, form })
+    }
+}
+
+/// The rows of some columns, batch by batch.
+pub(super) struct Batches {
+    /// The file's name, for messages.
+    name: String,
+    /// How many rows came.
+    rows: u64,
+    form: Form,
+}
+
+enum Form {
+    Parquet {
+        reader: Box<ParquetRecordBatchReader>,
+        length: u64,
+        /// How many rows there are.
+        of: u64,
+    },
+    File {
+        reader: Box<FileReader<BufReader<File>>>,
+        length: u64,
+        /// How many batches came.
+        read: usize,
+    },
+    Stream {
+        reader: Box<StreamReader<Box<dyn Read + Send>>>,
+        bytes_read: Arc<AtomicU64>,
+        total: Option<u64>,
+    },
+}
+
+impl Batches {
+    /// The number of bytes read so far, and of how many if that is known.
+    pub(super) fn progress(&self) -> (u64, Option<u64>) {
+        let share =
+            |part: f64, all: f64, length: u64| ((length as f64 * part / all.max(1.0)) as u64, Some(length));
+        match &self.form {
+            Form::Parquet { length, of, .. } => share(self.rows as f64, *of as f64, *length),
+            Form::File { reader, length, read } => share(*read as f64, reader.num_batches() as f64, *length),
+            Form::Stream { bytes_read, total, .. } => (bytes_read.load(Ordering::Relaxed), *total),
+        }
+    }
+}
+
+impl Iterator for Batches {
+    type Item = Result<RecordBatch, Error>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let batch = match &mut self.form {
+            Form::Parquet { reader, .. } => guarded(|| reader.next().transpose()),
+            Form::File { reader, read, .. } => {
+                *read += 1;
+                guarded(|| reader.next().transpose())
+            }
+            Form::Stream { reader, .. } => guarded(|| reader.next().transpose()),
+        };
+        match batch.transpose()? {
+            Ok(batch) => {
+                self.rows += batch.num_rows() as u64;
+                Some(Ok(batch))
+            }
+            Err(error) => Some(Err(damaged(&self.name, self.rows, &error))),
+        }
+    }
+}
+
+/// Does what reads a file, whose libraries panic about some damages: that is an error as any other, and nothing is printed.
+fn guarded<T>(work: impl FnOnce() -> Result<T, ArrowError>) -> Result<T, ArrowError> {
+    thread_local! {
+        static GUARDED: Cell<bool> = const { Cell::new(false) };
+    }
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let others = panic::take_hook();
+        panic::set_hook(Box::new(move |panic| {
+            if !GUARDED.get() {
+                others(panic);
+            }
+        }));
+    });
+    GUARDED.set(true);
+    // What was at work is given up.
+    let done = panic::catch_unwind(AssertUnwindSafe(work));
+    GUARDED.set(false);
+    done.unwrap_or_else(|_| {
+        Err(ArrowError::ParseError("what it says of itself does not fit together".to_owned()))
+    })
+}
+
+/// A stream of which a copy is kept.
+struct Kept<R> {
+    bytes: R,
+    copy: Vec<u8>,
+}
+
+impl<R: Read> Read for Kept<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.bytes.read(buffer)?;
+        self.copy.extend_from_slice(buffer.get(..count).unwrap_or_default());
+        Ok(count)
+    }
+}
+
+/// A file, and its length.
+fn opened(path: &Path, name: &str) -> Result<(File, u64), Error> {
+    let opened = File::open(path).and_then(|file| {
+        let length = file.metadata()?.len();
+        Ok((file, length))
+    });
+    opened.map_err(|error| Error::io(name, format!("cannot be read: {error}")))
+}
+
+fn no_whole_file(name: &str, format: &str, error: &ArrowError) -> Error {
+    let reason = escaped(&error.to_string());
+    let message = format!("this is no whole {format} file ({reason}); copy it again, or write it anew");
+    Error::data(name, None, message)
+}
+
+/// Says what an error of a reader means after so many rows.
+fn damaged(name: &str, rows: u64, error: &ArrowError) -> Error {
+    match error {
+        ArrowError::IoError(_, error) if error.kind() == io::ErrorKind::UnexpectedEof => {
+            let message =
+                format!("it ends too early, after {rows} whole rows: it is truncated; copy it again");
+            Error::data(name, None, message)
+        }
+        ArrowError::IoError(_, error) => Error::io(name, format!("cannot be read: {error}")),
+        error => {
+            let reason = escaped(&error.to_string());
+            let message =
+                format!("it is damaged after {rows} rows ({reason}); copy it again, or write it anew");
+            Error::data(name, None, message)
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! Logs in Parquet and Arrow files, of PyArrow and Polars: they are the same log as in text (`tests/data/columnar/make.py`).
+
+use std::fs;
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use crate::harness::Folder;
+
+/// The files beside log.csv, and whether their times name no offset from UTC, so that the first is written in it.
+const FILES: [(&str, bool); 6] = [
+    ("pyarrow.parquet", false),
+    ("pyarrow.arrow", false),
+    ("pyarrow.arrows", false),
+    ("polars.parquet", true),
+    ("polars.arrow", true),
+    ("polars.arrows", true),
+];
+
+fn data(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data/columnar").join(name)
+}
+
+/// All of them in a folder.
+fn folder() -> Folder {
+    let folder = Folder::new();
+    for name in FILES.map(|(name, _)| name).into_iter().chain(["log.csv"]) {
+        folder.write(name, fs::read(data(name)).unwrap());
+    }
+    folder
+}
+
+/// A report without what names the file.
+fn nameless(mut report: Value) -> Value {
+    report["command"].take();
+    report["data"]["logs"].take();
+    report
+}
+
+#[test]
+fn the_fit_is_that_of_the_text() {
+    let folder = folder();
+    let text = folder.fit("log.csv --time when --na 1 --nb 1 --validate 41..60");
+    for (name, in_utc) in FILES {
+        let report = folder.fit(&format!("{name} --time when --na 1 --nb 1 --validate 41..60"));
+        let start = if in_utc { "2024-03-01T11:00:00.25Z" } else { "2024-03-01T12:00:00.25+01:00" };
+        assert_eq!(report["data"]["logs"][0]["start"], start, "{name}");
+        assert_eq!(report["data"]["logs"][0]["file"], name);
+        assert_eq!(nameless(report), nameless(text.clone()), "{name}");
+    }
+}
+
+#[test]
+fn every_verb_reads_them() {
+    let folder = folder();
+    folder.done("fit log.csv --time when --na 1 --nb 1 --report model.json");
+    for (name, _) in FILES {
+        for verb in ["predict model.json", "simulate model.json", "track --na 1 --nb 1 --format csv --quiet"]
+        {
+            let of = |log: &str| {
+                let mut words: Vec<&str> = verb.split(' ').collect();
+                words.insert(if words[0] == "track" { 1 } else { 2 }, log);
+                folder.done(&format!("{} --time when", words.join(" "))).stdout
+            };
+            assert_eq!(of(name), of("log.csv"), "{verb} {name}");
+        }
+        folder.done(&format!("validate model.json {name} --time when"));
+        let json = folder.done(&format!("inspect {name} --time when --format json")).stdout;
+        let inspection: Value = serde_json::from_str(&json).unwrap();
+        let left_out = inspection["warnings"].to_string();
+        assert!(left_out.contains("('note') is left out: it holds no numbers"), "{left_out}");
+    }
+}
+
+#[test]
+fn a_column_of_times_is_pointed_out() {
+    let folder = folder();
+    let said = folder.done("fit polars.parquet --na 1 --nb 1").stderr;
+    let expected = "polars.parquet: column 'when' looks like a clock; --time when would use it";
+    assert!(said.contains(expected), "{said}");
+}
+
+#[test]
+fn a_pipe_may_bring_a_stream() {
+    let folder = folder();
+    let options = "--time when --na 1 --nb 1 --quiet --format csv";
+    let expected = folder.done(&format!("track log.csv {options}")).stdout;
+    for (name, _) in FILES {
+        let run = folder.run_on(&format!("track - {options}"), fs::read(data(name)).unwrap());
+        if !name.ends_with(".arrows") {
+            assert!(run.refusal().contains("cannot come through a pipe; name the file"), "{}", run.stderr);
+        } else {
+            assert_eq!((run.code, run.stdout), (0, expected.clone()), "{name}: {}", run.stderr);
+        }
+    }
+}
+
+#[test]
+fn a_run_that_was_ended_goes_on() {
+    let folder = folder();
+    let options = "--time when --na 1 --nb 1 --quiet --format csv";
+    let whole = folder.done(&format!("track log.csv {options}")).stdout;
+    for (name, _) in FILES {
+        folder.done(&format!("track {name} {options} --state {name}.state -o {name}.csv"));
+        folder.done(&format!("track {name} {options} --state {name}.state -o {name}.csv"));
+        assert_eq!(folder.read(&format!("{name}.csv")), whole, "{name}");
+    }
+}
+
+#[test]
+fn what_they_do_not_hold_is_refused() {
+    let folder = folder();
+    let refused = |line: &str, expected: &str| {
+        let refusal = folder.refused(line, 3);
+        assert!(refusal.contains(expected), "{refusal}");
+    };
+    refused("fit pyarrow.parquet -u note --na 1 --nb 1", "pyarrow.parquet: column 'note' holds texts");
+    refused("fit pyarrow.parquet -u pair --na 1 --nb 1", "column 'pair' is of the type Struct");
+    refused("fit pyarrow.parquet -u when --na 1 --nb 1", "column 'when' holds times");
+    refused(
+        "fit pyarrow.arrow --delimiter ; --na 1 --nb 1",
+        "--delimiter says how a text is written, and this is an Arrow file",
+    );
+    refused(
+        "fit polars.arrow --time when --time-format %Y --na 1 --nb 1",
+        "--time-format says nothing of it",
+    );
+    folder.write("short.parquet", &fs::read(data("polars.parquet")).unwrap()[..3000]);
+    refused("fit short.parquet --na 1 --nb 1", "short.parquet: this is no whole Parquet file");
+    folder.write("short.arrow", &fs::read(data("polars.arrow")).unwrap()[..1500]);
+    refused("fit short.arrow --na 1 --nb 1", "short.arrow: this is no whole Arrow file");
+    folder.write("short.arrows", &fs::read(data("polars.arrows")).unwrap()[..1500]);
+    refused("fit short.arrows --na 1 --nb 1", "short.arrows: it ends too early");
+}

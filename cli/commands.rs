@@ -16,6 +16,7 @@ mod grey_box;
 mod help;
 mod inspect;
 mod narx;
+mod pieces;
 mod process;
 mod reduce;
 mod respond;

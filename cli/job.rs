@@ -79,6 +79,16 @@ pub(crate) fn only<'p>(verb: &str, logs: &'p [PathBuf]) -> Result<&'p Path, Fail
     }
 }
 
+impl Clock {
+    /// The column of times, if there is one.
+    pub(crate) fn column(&self) -> Option<String> {
+        match self {
+            Self::Column { name, .. } => Some(name.clone()),
+            Self::Fixed(_) | Self::Unknown => None,
+        }
+    }
+}
+
 impl LogJob {
     pub(crate) fn resolve(log: &LogArguments, clock: &ClockArguments) -> Result<Self, Failure> {
         let encoding = log.encoding.as_deref().map(|label| {

@@ -111,14 +111,131 @@ pub(crate) fn load(
             source.resampled = Some(Resampling::new(how, &time).map_err(at_line(&file, &table.lines))?);
             Log::resampled(channels, &time, how)
         }
-        (_, Some(time)) if clocks.any => Log::recorded(channels, time),
-        (_, Some(time)) => Log::with_time(channels, time),
-        (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
-        (_, None) => Log::new(channels, clocks.sample_time.unwrap_or(1.0)),
+        (_, time) => made(channels, time, job, clocks),
     };
     let log = log.map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
     Ok(Loaded { log, source, words })
+}
+
+/// The values of a part are at most so many, or a few more.
+const PART: usize = 1 << 20;
+/// What is left at the end of a log and has fewer rows than this belongs to the part before it.
+const FEW: usize = 1 << 10;
+
+/// A part of a log that is read in several: the rows, with some of the part before it in front.
+#[derive(Debug)]
+pub(crate) struct Piece {
+    pub(crate) log: Log,
+    /// The log's name, with the rows of the part that are its own.
+    pub(crate) source: Source,
+    /// How many rows are of the part before it.
+    pub(crate) past: usize,
+}
+
+/// Reads the columns of a log that `choose` names, each part with as many rows of the one before it as it says, and hands them
+/// on with what it chose: memory does not grow with the rows. Gives what the reader should know, in plain words.
+pub(crate) fn in_pieces<T>(
+    path: &Path,
+    job: &LogJob,
+    choose: impl FnOnce(&[String]) -> Result<(Vec<String>, usize, T), Failure>,
+    take: &mut dyn FnMut(&T, Piece) -> Result<(), Failure>,
+) -> Result<Vec<String>, Failure> {
+    let reader = Reader::open(path, &job.options)?;
+    let file = path.display().to_string();
+    let (names, lags, chosen) = choose(reader.names())?;
+    let (selection, mut words) = selected(&reader, &file, job, &names)?;
+    let most = (PART / (names.len() + 1)).max(2 * lags);
+    let mut before = Before { file: &file, names: &names, job, lags, rows: 0, tail: Part::default() };
+    let mut waiting: Option<Table> = None;
+    let progress = (!job.quiet).then(Reading::new);
+    let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
+    reader.read_parts(&selection, most, &mut update, &mut |mut part: Table| {
+        for word in std::mem::take(&mut part.words) {
+            if !words.contains(&word) {
+                words.push(word);
+            }
+        }
+        match &mut waiting {
+            Some(waiting) if part.rows < FEW => waiting.extend(part),
+            waiting => {
+                if let Some(whole) = waiting.replace(part) {
+                    take(&chosen, before.with(whole)?)?;
+                }
+            }
+        }
+        if interrupt::asked() { Err(Failure::interrupted()) } else { Ok(()) }
+    })?;
+    if let Some(last) = waiting {
+        take(&chosen, before.with(last)?)?;
+    }
+    Ok(words)
+}
+
+/// Columns, and their times where there is a clock.
+#[derive(Debug, Default)]
+struct Part {
+    columns: Vec<Vec<f64>>,
+    time: Option<Vec<f64>>,
+}
+
+/// What a part of a log has to know of those before it.
+struct Before<'l> {
+    file: &'l str,
+    names: &'l [String],
+    job: &'l LogJob,
+    lags: usize,
+    /// How many rows there were.
+    rows: usize,
+    /// The last of them.
+    tail: Part,
+}
+
+impl Before<'_> {
+    /// The next part, with the rows before it.
+    fn with(&mut self, table: Table) -> Result<Piece, Failure> {
+        let Table { columns, time, start, rows, lines, .. } = table;
+        let (file, past) = (self.file, self.tail.columns.first().map_or(0, Vec::len));
+        let front = |tail: Option<&Vec<f64>>, values: Vec<f64>| match tail {
+            Some(tail) if !tail.is_empty() => [tail.as_slice(), &values].concat(),
+            _ => values,
+        };
+        let columns: Vec<Vec<f64>> = columns
+            .into_iter()
+            .enumerate()
+            .map(|(column, values)| front(self.tail.columns.get(column), values))
+            .collect();
+        let time = time.map(|time| front(self.tail.time.as_ref(), time));
+        let last = |values: &Vec<f64>| values[values.len() - self.lags.min(values.len())..].to_vec();
+        self.tail = Part { columns: columns.iter().map(last).collect(), time: time.as_ref().map(last) };
+        // Rows of the part before it have no line here; what a clock says of them it has said before.
+        let row = |row: usize| lines.place(file, row.saturating_sub(past + 1), self.rows);
+        let failed =
+            |error: Error| Failure::about(&error, |found| found.map_or_else(|| file.to_owned(), row));
+        let channels = self.names.iter().cloned().zip(columns);
+        let channels = channels.map(|(name, values)| Channel { name, values }).collect();
+        let log = made(channels, time, self.job, Clocks::default()).map_err(failed)?;
+        let (first, end) = (self.rows + 1, self.rows + rows);
+        let source = Source {
+            file: format!("{file} (rows {first}..{end})"),
+            rows: Rows::new(1, past + rows).map_err(failed)?,
+            time: self.job.clock.column(),
+            start,
+            resampled: None,
+        };
+        self.rows = end;
+        Ok(Piece { log, source, past })
+    }
+}
+
+/// A log of channels, with the clock of the job.
+fn made(channels: Vec<Channel>, time: Option<Vec<f64>>, job: &LogJob, clocks: Clocks) -> Result<Log, Error> {
+    match (&job.clock, time) {
+        (_, Some(time)) if clocks.any => Log::recorded(channels, time),
+        (_, Some(time)) => Log::with_time(channels, time),
+        (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
+        (_, None) => Log::new(channels, clocks.sample_time.unwrap_or(1.0)),
+    }
 }
 
 /// A log as it was recorded, its clock irregular or not.
@@ -169,7 +286,7 @@ pub(crate) fn at_line(file: &str, lines: &Lines) -> impl Fn(Error) -> Failure {
     move |error| {
         Failure::about(&error, |row| match row {
             // The library counts rows from 1, the table from 0.
-            Some(row) => lines.place(file, row - 1),
+            Some(row) => lines.place(file, row - 1, 0),
             None => file.to_owned(),
         })
     }
@@ -205,9 +322,8 @@ fn columns(
 
     let values = std::mem::take(&mut table.columns);
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
-    let clock = if let Clock::Column { name, .. } = &job.clock { Some(name.clone()) } else { None };
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
-    let source = Source { file, rows, time: clock, start: table.start.take(), resampled: None };
+    let source = Source { file, rows, time: job.clock.column(), start: table.start.take(), resampled: None };
     Ok(Columns { channels, table, source, words })
 }
 

@@ -116,8 +116,21 @@ pub(crate) struct Selection {
     pub(crate) time: Option<usize>,
 }
 
+impl Table {
+    /// Appends the part of the same file that follows.
+    pub(crate) fn extend(&mut self, part: Self) {
+        for (column, more) in
+            self.columns.iter_mut().chain(&mut self.time).zip(part.columns.iter().chain(&part.time))
+        {
+            column.extend_from_slice(more);
+        }
+        self.lines.extend(self.rows, &part.lines);
+        self.rows += part.rows;
+    }
+}
+
 /// The columns that were read.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     /// The selected columns, in the selection's order; a missing value is NaN.
     pub(crate) columns: Vec<Vec<f64>>,

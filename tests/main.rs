@@ -54,6 +54,7 @@ mod signals;
 mod spectrum;
 mod state_space;
 mod step;
+mod stream;
 mod terminal;
 mod track;
 mod track_live;

@@ -1,6 +1,6 @@
 //! The logs of a fit, read as one, and the columns that the model is about.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thetahat::data::{Log, Source};
 
@@ -40,13 +40,17 @@ pub(crate) struct Wanted<'a> {
 
 /// Reads all logs, one after the other, with any clock or with an even one.
 pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
-    let wanted = Wanted {
+    read(&job.paths, &job.log, &wanted(job), any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
+}
+
+/// The columns that a polynomial model wants.
+pub(super) fn wanted(job: &FitJob) -> Wanted<'_> {
+    Wanted {
         inputs: job.inputs.as_deref(),
         outputs: &job.outputs,
         driven: job.orders.has_inputs(),
         none: "--nb 0",
-    };
-    read(&job.paths, &job.log, &wanted, any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
+    }
 }
 
 /// The same; `check` says whether the number of inputs goes with the rest.
@@ -60,16 +64,7 @@ pub(super) fn read(
     let mut channels: Option<Channels> = None;
     let Joined { log, sources, words } =
         log::joined(paths, log, Clocks { any: any_clock, sample_time: None }, |path, header| {
-            let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
-            let own = Channels::choose(wanted, header).map_err(bad)?;
-            let first = channels.get_or_insert_with(|| own.clone());
-            if own != *first {
-                return Err(bad(format!(
-                    "its inputs are {}, those of the first log {}; name with --input what all have",
-                    log::listed(&own.inputs),
-                    log::listed(&first.inputs)
-                )));
-            }
+            let own = Channels::same(wanted, path, header, &mut channels)?;
             check(own.inputs.len())?;
             Ok(own.inputs.into_iter().chain(own.outputs).collect())
         })?;
@@ -80,6 +75,26 @@ impl Channels {
     /// The inputs, and the output of a model that has one.
     pub(crate) fn single(mut self) -> (Vec<String>, String) {
         (self.inputs, self.outputs.pop().unwrap_or_default())
+    }
+
+    /// Those of a log, which are those of the logs before it.
+    pub(super) fn same(
+        wanted: &Wanted<'_>,
+        path: &Path,
+        header: &[String],
+        known: &mut Option<Self>,
+    ) -> Result<Self, Failure> {
+        let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
+        let own = Self::choose(wanted, header).map_err(bad)?;
+        let first = known.get_or_insert_with(|| own.clone());
+        if own != *first {
+            return Err(bad(format!(
+                "its inputs are {}, those of the first log {}; name with --input what all have",
+                log::listed(&own.inputs),
+                log::listed(&first.inputs)
+            )));
+        }
+        Ok(own)
     }
 
     /// The named ones, or those called u, u1, u2, … and y.

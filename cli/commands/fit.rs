@@ -12,7 +12,7 @@ use thetahat::report::{
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
 use super::search::{Identified, Telling};
-use super::{grey_box, narx, process, state_space, stored, summary};
+use super::{grey_box, narx, pieces, process, state_space, stored, summary};
 use crate::args::{EachArguments, FitArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
@@ -49,10 +49,12 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
 
 /// A fit, resolved: what model, and how it is fitted.
 enum Resolved {
-    GreyBox(GreyBoxJob),
-    Narx(NarxJob),
+    GreyBox(Box<GreyBoxJob>),
+    Narx(Box<NarxJob>),
     Process(Box<ProcessJob>),
     StateSpace(Box<StateSpaceJob>),
+    /// The logs are read part by part.
+    Pieces(Box<FitJob>),
     Polynomial {
         job: Box<FitJob>,
         /// Whether the log is wanted afterwards.
@@ -63,19 +65,27 @@ enum Resolved {
 fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
     check_linear(&arguments.narx)?;
     if let Some(model) = &arguments.grey {
-        return Ok(Resolved::GreyBox(GreyBoxJob::resolve(arguments, model)?));
+        return Ok(Resolved::GreyBox(Box::new(GreyBoxJob::resolve(arguments, model)?)));
     }
     if let Some(map) = arguments.narx.narx {
-        return Ok(Resolved::Narx(NarxJob::resolve(arguments, map)?));
+        return Ok(Resolved::Narx(Box::new(NarxJob::resolve(arguments, map)?)));
     }
     if let Some(job) = ProcessJob::resolve(arguments)? {
         return Ok(Resolved::Process(Box::new(job)));
     }
     if let Some(job) = StateSpaceJob::resolve(arguments, false)? {
+        if arguments.stream {
+            return Err(Failure::usage(
+                "--stream is for ARX and AR models of one output and impulse responses; fit one output after the other, or leave it out",
+            ));
+        }
         return Ok(Resolved::StateSpace(Box::new(job)));
     }
     let job = FitJob::resolve(arguments)?;
     job.check_output()?;
+    if arguments.stream {
+        return Ok(Resolved::Pieces(Box::new(job)));
+    }
     Ok(Resolved::Polynomial { job: Box::new(job), keeps_log: arguments.html.is_some() })
 }
 
@@ -87,6 +97,7 @@ impl Resolved {
             Self::Narx(job) => narx::found(job, telling),
             Self::Process(job) => process::found(job, telling),
             Self::StateSpace(job) => state_space::found(job, telling),
+            Self::Pieces(job) => pieces::found(job, telling),
             Self::Polynomial { job, keeps_log } => found(job, *keeps_log, telling),
         }
     }

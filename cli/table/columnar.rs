@@ -155,36 +155,47 @@ impl ColumnarReader {
         selection: &Selection,
         progress: &mut dyn FnMut(u64, Option<u64>),
     ) -> Result<Table, Error> {
+        let mut whole = Table::default();
+        self.read_parts(selection, None, progress, &mut |table| {
+            whole = table;
+            Ok::<(), Error>(())
+        })?;
+        Ok(whole)
+    }
+
+    /// The same in parts of `most` rows, or a little more; none: in one.
+    pub(super) fn read_parts<E: From<Error>>(
+        self,
+        selection: &Selection,
+        most: Option<usize>,
+        progress: &mut dyn FnMut(u64, Option<u64>),
+        take: &mut dyn FnMut(Table) -> Result<(), E>,
+    ) -> Result<(), E> {
         let bound = self.options.bound;
         let rows = self.opened.rows();
         let mut conversion = self.conversion(selection, None)?;
         let too_large = |values: usize| bound.and_then(|bound| bound.passed_by(values));
         let width = conversion.fields.len();
         if let Some(words) = rows.and_then(|rows| too_large(rows.saturating_mul(width))) {
-            return Err(conversion.too_large(&words));
+            return Err(conversion.too_large(&words).into());
         }
-        let mut part = Part::new(width, rows.unwrap_or(0));
+        let room = most.or(rows).unwrap_or(0);
+        let mut part = Part::new(width, room);
         while let Some(batch) = conversion.batch()? {
             conversion.append(&batch, &mut part)?;
             if let Some(fault) = part.first_fault() {
-                return Err(fault);
+                return Err(fault.into());
             }
             if let Some(words) = too_large(part.rows.saturating_mul(width)) {
-                return Err(conversion.too_large(&words));
+                return Err(conversion.too_large(&words).into());
             }
             let (read, total) = conversion.batches.progress();
             progress(read, total);
+            if most.is_some_and(|most| part.rows >= most) {
+                take(conversion.table(std::mem::replace(&mut part, Part::new(width, room)), selection))?;
+            }
         }
-        let place = |field: &usize| conversion.fields.binary_search(field).unwrap_or_default();
-        let mut take = |field| part.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
-        Ok(Table {
-            columns: selection.columns.iter().map(&mut take).collect(),
-            time: selection.time.as_ref().map(take),
-            start: conversion.clock.and_then(|clock| clock.start),
-            rows: part.rows,
-            lines: Lines::default(),
-            words: part.words,
-        })
+        take(conversion.table(part, selection))
     }
 
     /// Gives the rows of the selected columns one by one; see [`Reader::stream`](super::Reader::stream).
@@ -351,6 +362,20 @@ impl Conversion {
         part.rows += batch.num_rows();
         *rows += batch.num_rows() as u64;
         Ok(())
+    }
+
+    /// A table of some rows, its columns in the order of the selection.
+    fn table(&self, mut part: Part, selection: &Selection) -> Table {
+        let place = |field: &usize| self.fields.binary_search(field).unwrap_or_default();
+        let mut take = |field| part.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
+        Table {
+            columns: selection.columns.iter().map(&mut take).collect(),
+            time: selection.time.as_ref().map(take),
+            start: self.clock.as_ref().and_then(|clock| clock.start.clone()),
+            rows: part.rows,
+            lines: Lines::default(),
+            words: part.words,
+        }
     }
 
     /// The error for a table that takes more memory than there is.

@@ -105,6 +105,22 @@ impl Reader {
         }
     }
 
+    /// Reads the selected columns, and gives them part by part, each with `most` rows or a little more, the last one with what is
+    /// left: memory does not grow with the rows. Else as [`read`](Self::read).
+    pub(crate) fn read_parts<E: From<Error>>(
+        self,
+        selection: &Selection,
+        most: usize,
+        progress: &mut dyn FnMut(u64, Option<u64>),
+        take: &mut dyn FnMut(Table) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self {
+            Self::Text(reader) => reader.read_parts(selection, Some(most), progress, take),
+            #[cfg(feature = "columnar")]
+            Self::Columnar(reader) => reader.read_parts(selection, Some(most), progress, take),
+        }
+    }
+
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
     /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
     /// from the first one.

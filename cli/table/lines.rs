@@ -12,10 +12,11 @@ pub(crate) struct Lines {
 }
 
 impl Lines {
-    /// A row of a file as messages name it: by its line, as an editor counts, or without lines by its number.
-    pub(crate) fn place(&self, file: &str, row: usize) -> String {
+    /// A row of a file, or of a part of it after so many rows, as messages name it: by its line, as an editor counts, or without
+    /// lines by its number.
+    pub(crate) fn place(&self, file: &str, row: usize, before: usize) -> String {
         if self.runs.is_empty() {
-            format!("{file}: row {}", row + 1)
+            format!("{file}: row {}", before + row + 1)
         } else {
             format!("{file}:{}", self.of(row))
         }
@@ -36,6 +37,11 @@ impl Lines {
         if self.runs.last().is_none_or(|&(_, last)| last != ahead) {
             self.runs.push((row, ahead));
         }
+    }
+
+    /// Appends the map of the part after `rows` rows of this one.
+    pub(super) fn extend(&mut self, rows: usize, part: &Self) {
+        part.runs.iter().for_each(|&(first, ahead)| self.push(rows + first, first as u64 + ahead));
     }
 
     /// Appends the map of a piece that starts at `row` and `line` of this one.

@@ -207,6 +207,22 @@ impl TextReader {
         selection: &Selection,
         progress: &mut dyn FnMut(u64, Option<u64>),
     ) -> Result<Table, Error> {
+        let mut whole = Table::default();
+        self.read_parts(selection, None, progress, &mut |table| {
+            whole = table;
+            Ok::<(), Error>(())
+        })?;
+        Ok(whole)
+    }
+
+    /// The same in parts of `most` rows, or a little more; none: in one.
+    pub(super) fn read_parts<E: From<Error>>(
+        self,
+        selection: &Selection,
+        most: Option<usize>,
+        progress: &mut dyn FnMut(u64, Option<u64>),
+        take: &mut dyn FnMut(Table) -> Result<(), E>,
+    ) -> Result<(), E> {
         let fields = self.fields(selection)?;
         let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
         let (clock, start) = self.clock(selection, &numbers)?;
@@ -227,7 +243,8 @@ impl TextReader {
         loop {
             let text = &current.text()[position..];
             let (whole, tail) = text.split_at(memrchr(b'\n', text).map_or(0, |newline| newline + 1));
-            let share = source.share_read();
+            // What is given in parts needs no room for all.
+            let share = source.share_read().filter(|_| most.is_none());
             let (read, filled) = rayon::join(
                 || plan.read(whole, sizes.piece, share, &mut record, &mut rows),
                 || {
@@ -243,25 +260,29 @@ impl TextReader {
             if let Some(words) =
                 options.bound.and_then(|bound| bound.passed_by(rows.count * plan.fields.len()))
             {
-                return Err(plan.layout.too_large(rows.line, &words));
+                return Err(plan.layout.too_large(rows.line, &words).into());
             }
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {
                     let row = Row { record: &record, text: left, line: rows.line };
-                    return Err(plan.layout.unclosed(&row));
+                    return Err(plan.layout.unclosed(&row).into());
                 }
                 progress(source.bytes_read(), source.total());
-                return Ok(plan.table(rows, selection, start));
+                return take(plan.table(rows, selection, start));
             }
             if left.len() > sizes.row {
-                return Err(plan.layout.too_long(rows.line, sizes.row));
+                return Err(plan.layout.too_long(rows.line, sizes.row).into());
             }
             filled?;
             next.prepend(&whole[taken..]);
             progress(source.bytes_read(), source.total());
             std::mem::swap(&mut current, &mut next);
             position = 0;
+            if most.is_some_and(|most| rows.count >= most) {
+                let after = Rows::new(plan.fields.len(), rows.line);
+                take(plan.table(std::mem::replace(&mut rows, after), selection, start.clone()))?;
+            }
         }
     }
 

@@ -114,3 +114,56 @@ def test_wrong_arguments_are_refused(client: Any) -> None:
         thetahat.dask.fit_many({"a": MOTOR}, th.arx, na=1, nb=2, per_task=0)
     with pytest.raises(ValueError, match="by"):
         thetahat.dask.fit_many({"a": MOTOR}, th.arx, by="unit", na=1, nb=2)
+
+
+ORDERS: dict[str, Any] = {"na": 2, "nb": 2, "nk": 1}
+
+
+def close(one: th.Model, other: th.Model) -> bool:
+    pairs = [(one.parameters, other.parameters), (one.standard_errors, other.standard_errors), (one.mse, other.mse)]
+    return all(np.allclose(a, b, rtol=1e-12, atol=0) for a, b in pairs)
+
+
+def test_one_model_from_many_pieces(client: Any, tmp_path: Path) -> None:
+    whole = th.arx(MOTOR, **ORDERS)
+    cuts = [0, 100, 350, 351, 600, 1000]
+    pieces = [MOTOR[first:last] for first, last in zip(cuts, cuts[1:])]
+    sums = thetahat.dask.normal_equations(pieces, **ORDERS).compute()
+    assert (sums.rows, sums.pieces) == (1000, 5)
+    assert close(sums.solve(), whole)
+    # Files of Parquet with a clock, and the partitions of a frame.
+    frame = MOTOR.to_pandas().reset_index(names="t")
+    frame["t"] = pd.Timestamp("2026-03-01T12:00", tz="Europe/Berlin") + pd.to_timedelta(frame["t"], unit="s")
+    paths = [tmp_path / f"{number}.parquet" for number in range(4)]
+    for number, path in enumerate(paths):
+        frame[250 * number : 250 * (number + 1)].to_parquet(path)
+    sums = thetahat.dask.normal_equations(paths, read={"time": "t"}, **ORDERS).compute()
+    assert sums.samples == 998
+    assert close(sums.solve(), th.arx(th.read_log(paths[0], time="t"), **ORDERS)) is False
+    assert np.allclose(sums.solve().parameters, whole.parameters, rtol=1e-9)
+    together = dask.dataframe.from_pandas(MOTOR.to_pandas().reset_index(names="t"), npartitions=3)
+    read = {"inputs": "u", "output": "y", "time": "t"}
+    assert close(thetahat.dask.normal_equations(together, read=read, **ORDERS).compute().solve(), whole)
+    # Experiments.
+    logs = [MOTOR[:400], MOTOR[600:]]
+    both = thetahat.dask.normal_equations(logs, experiments=True, **ORDERS).compute()
+    assert close(both.solve(), th.arx(th.Log.join(logs), **ORDERS))
+
+
+def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
+    one, two = MOTOR[:500].to_pandas().reset_index(names="t"), MOTOR[500:].to_pandas().reset_index(names="t")
+    read = {"inputs": "u", "output": "y", "time": "t"}
+
+    def refusal(pieces: dict[str, Any]) -> str:
+        with pytest.raises(ValueError) as caught:
+            thetahat.dask.normal_equations(pieces, read=read, **ORDERS).compute()
+        return str(caught.value)
+
+    assert refusal({"first": one, "none": two[:0]}).startswith("none: ")
+    assert "clock goes back" in refusal({"first": two, "second": one}) or "second: " in refusal({"first": two, "second": one})
+    assert "twice" in refusal({"first": one, "second": two, "again": two}) or "again: " in refusal(
+        {"first": one, "second": two, "again": two}
+    )
+    assert refusal({"first": one, "other": two.rename(columns={"u": "v"})}).startswith("other: ")
+    with pytest.raises(ValueError, match="na"):
+        thetahat.dask.normal_equations([MOTOR]).compute()

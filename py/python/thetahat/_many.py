@@ -35,7 +35,7 @@ class Work:
         row: dict[str, Any] = {"log": name, "exit_code": 0}
         with _said.kept() as words:
             try:
-                found = self.fit(self._log(name, item), **self.options)
+                found = self.fit(self.log(name, item), **self.options)
                 text = found.to_json()
                 figures = _thetahat.row(text)
             except (ValueError, OSError, _thetahat.EstimationError) as error:
@@ -54,7 +54,8 @@ class Work:
             row["report"] = report
         return row, found
 
-    def _log(self, name: str, item: Item) -> Log:
+    def log(self, name: str, item: Item) -> Log:
+        """The log that an item is."""
         if isinstance(item, Log):
             return item
         if isinstance(item, (str, os.PathLike)):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from thetahat import _options, _thetahat
+from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
@@ -165,7 +164,7 @@ class NormalEquations:
         """
         solved = Model._of(self._sums.solve())
         for warning in solved._model.warnings():
-            warnings.warn(warning, EstimationWarning, stacklevel=2)
+            _said.warn(warning, EstimationWarning, stacklevel=2)
         return solved
 
     @property

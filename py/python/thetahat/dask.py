@@ -1,4 +1,4 @@
-"""Many logs on many machines: `thetahat.fit_many` on Dask.
+"""Many logs on many machines: `thetahat.fit_many` on Dask; and one model of a log that many machines have pieces of.
 
 Needs ``pip install "thetahat[dask]"``. Nothing here schedules: Dask shares the work out, repeats what a lost worker had, and is
 interrupted as it always is. A task fits a few logs, one after the other, on one thread of its worker. The same logs and arguments give
@@ -19,19 +19,23 @@ the same rows, whatever the workers.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, Union
 
 import dask
 import dask.bag
 import dask.dataframe
+import numpy
 import pandas
 from dask.delayed import Delayed
 
-from thetahat import _many, _thetahat
+from thetahat import _many, _said, _thetahat
 from thetahat._fit import search
+from thetahat._log import Log
+from thetahat._normal_equations import NormalEquations as _NormalEquations
 
-__all__ = ["fit_many", "rows"]
+__all__ = ["fit_many", "normal_equations", "rows"]
 
 Logs = Union[str, Iterable[Any], Mapping[str, Any], "dask.bag.Bag", "dask.dataframe.DataFrame"]
 
@@ -130,6 +134,121 @@ def rows(
     ['OE(2, 2, 1)']
     """
     return dask.bag.from_delayed(_tasks(logs, _many.Work(fit, options, dict(read or {})), by, reports, per_task))
+
+
+def normal_equations(
+    logs: Logs, *, experiments: bool = False, read: Mapping[str, Any] | None = None, **orders: Any
+) -> Delayed:
+    """The normal equations of one model, of which the workers of Dask have pieces: `thetahat.NormalEquations`, merged as a tree.
+
+    A worker has a few pieces in memory, and hands on some kilobytes. The result is solved where it is wanted:
+    ``normal_equations(…).compute().solve()`` is the model that a fit to all rows in one pass gives.
+
+    Parameters
+    ----------
+    logs : iterable, dict of names to logs, str or DataFrame
+        The pieces, as for `fit_many`: files, logs, frames, delayed objects; or a data frame of Dask, whose partitions they are. Parts of
+        one log in the order of time, unless ``experiments`` says otherwise: what the model reaches back to comes from the piece before.
+    experiments : bool, default False
+        Whether each piece is an experiment of its own, into which nothing reaches from another.
+    read : dict, optional
+        How pieces are read, as for `thetahat.fit_many`.
+    **orders
+        The arguments of `thetahat.NormalEquations`, ``past`` excepted.
+
+    Returns
+    -------
+    Delayed
+        Of `thetahat.NormalEquations`. Computing it raises a ValueError that names the piece which has no rows, other columns, or a clock that
+        goes back.
+
+    Examples
+    --------
+    >>> import dask
+    >>> import thetahat as th
+    >>> import thetahat.dask
+    >>> motor = th.dc_motor()
+    >>> pieces = [motor[first : first + 100] for first in range(0, 1000, 100)]
+    >>> with dask.config.set(scheduler="threads"):
+    ...     sums = thetahat.dask.normal_equations(pieces, na=2, nb=2).compute()
+    >>> sums
+    NormalEquations(ARX(2, 2, 1), 1000 rows in 10 pieces, inputs u, output y)
+    >>> bool(abs(sums.solve().parameters - th.arx(motor, na=2, nb=2).parameters).max() < 1e-12)
+    True
+    """
+    work = _many.Work(read=dict(read or {}))
+    if isinstance(logs, dask.dataframe.DataFrame):
+        named = [(f"partition {place}", part) for place, part in enumerate(logs.to_delayed())]
+    else:
+        named = _many.name_all(logs)
+    lags = 0 if experiments else _lags(**orders)
+    loaded = [dask.delayed(_loaded)(work, name, item) for name, item in named]
+    tails = [dask.delayed(_tail)(log, lags) for log in loaded[:-1]] if lags else [None] * (len(loaded) - 1)
+    sums = [
+        dask.delayed(_sums)(name, log, tail, orders) for (name, _), log, tail in zip(named, loaded, [None, *tails])
+    ]
+    while len(sums) > 1:
+        sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
+    return sums[0]
+
+
+def _lags(
+    na: int = 0, nb: int | Sequence[int] = 0, nk: int | Sequence[int] | None = None, taps: int | Sequence[int] | None = None, **_: Any
+) -> int:
+    """How many rows the model reaches back to, at most."""
+    first = (0 if taps is not None else 1) if nk is None else int(numpy.max(nk))
+    count = int(numpy.max(nb if taps is None else taps))
+    return max(na or 0, first + count - 1 if count else 0)
+
+
+def _loaded(work: _many.Work, name: str, item: Any) -> pandas.DataFrame:
+    """A piece as a frame, with its roles and its clock among its attributes."""
+    with _in_piece(name), _said.kept():
+        log = work.log(name, item)
+    frame = log.to_pandas()
+    _, start = log._log.clock
+    if start is not None and not isinstance(frame.index, pandas.DatetimeIndex):
+        # A file's times count from its first one.
+        frame.index = pandas.to_datetime(start) + pandas.to_timedelta(log.time, unit="s")
+    # Without a clock the index says nothing of the time from one piece to the next.
+    step = None if log._log.time() is not None else log.sample_time
+    frame.attrs = {"inputs": log.inputs, "output": log.outputs, "sample_time": step}
+    return frame
+
+
+def _tail(frame: pandas.DataFrame, lags: int) -> pandas.DataFrame:
+    return frame.iloc[-lags:].copy()
+
+
+def _sums(name: str, frame: pandas.DataFrame, tail: pandas.DataFrame | None, orders: Mapping[str, Any]) -> _NormalEquations:
+    before = _thetahat.threads(_threads())
+    try:
+        with _in_piece(name):
+            roles = frame.attrs
+            if tail is not None and list(tail.columns) != list(frame.columns):
+                raise ValueError(f"its columns are {', '.join(frame.columns)}, those of the piece before it {', '.join(tail.columns)}")
+            whole = frame if tail is None else pandas.concat([tail, frame])
+            step = roles["sample_time"]
+            clock = {"time": whole.index} if step is None else {"sample_time": step}
+            if step is not None:
+                whole = whole.reset_index(drop=True)
+            log = Log.from_dataframe(whole, inputs=roles["inputs"], output=roles["output"], **clock)
+            return _NormalEquations(log, past=0 if tail is None else len(tail), **orders)
+    finally:
+        _thetahat.threads(before)
+
+
+def _merged(*sums: _NormalEquations) -> _NormalEquations:
+    return sums[0].merge(*sums[1:])
+
+
+@contextmanager
+def _in_piece(name: str) -> Iterator[None]:
+    """Errors say in which piece they are."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def _tasks(

@@ -1,0 +1,104 @@
+//! `fit --stream`: a log is read once, part by part.
+
+use serde_json::{Value, json};
+
+use crate::harness::{Folder, distance, number, parameters};
+use crate::signals::{Experiment, csv, plain_log};
+
+/// More rows than a part has, so that several are put together.
+const ROWS: usize = 800_000;
+
+fn deviation(one: &Value, other: &Value) -> f64 {
+    distance(&parameters(one), &parameters(other))
+}
+
+/// A long log, as text: its parts meet at rows 349,526 and 699,051.
+fn long() -> String {
+    let Experiment { u, y, .. } = Experiment::new(ROWS);
+    csv(&[("u", &u), ("y", &y)])
+}
+
+#[test]
+fn a_stream_gives_the_model_of_the_whole() {
+    let folder = Folder::with_log(long());
+    let whole = folder.fit("log.csv --na 2 --nb 2");
+    let stream = folder.fit("log.csv --na 2 --nb 2 --stream");
+    assert!(deviation(&whole, &stream) < 1e-12);
+    for figure in ["/estimation/mse", "/estimation/samples", "/fit/0/percent"] {
+        let (whole, stream) = (number(&whole, figure), number(&stream, figure));
+        assert!((whole / stream - 1.0).abs() < 1e-11, "{figure}: {whole} {stream}");
+    }
+    // What takes a second pass is not there.
+    assert_eq!(stream["fit"].as_array().map(Vec::len), Some(1));
+    assert!(stream["data"]["logs"].as_array().is_some_and(|logs| logs.len() > 1));
+    assert_eq!(
+        stream["data"]["logs"][1]["file"].as_str().map(|file| file.starts_with("log.csv (rows ")),
+        Some(true)
+    );
+    // From a pipe, and on one thread, the same bytes but for the name.
+    let text = folder.read("log.csv");
+    let line = "fit - --na 2 --nb 2 --stream --format json";
+    let piped = folder.run_on(line, &text);
+    assert_eq!(piped.code, 0, "{}", piped.stderr);
+    let mut command = folder.command("fit log.csv --na 2 --nb 2 --stream --format json");
+    command.env("RAYON_NUM_THREADS", "1");
+    let single = crate::harness::Run::of(command).stdout;
+    assert_eq!(piped.stdout.replace("\"- (rows", "\"log.csv (rows"), single);
+    assert_eq!(serde_json::from_str::<Value>(&single).ok(), Some(stream));
+    // The model is as good as any.
+    folder.done("fit log.csv --na 2 --nb 2 --stream --report model.json");
+    folder.write("short.csv", plain_log());
+    folder.done("validate model.json short.csv");
+}
+
+#[test]
+fn gaps_clocks_and_several_logs_are_what_they_are() {
+    let folder = Folder::new();
+    let Experiment { u, mut y, .. } = Experiment::new(3000);
+    y[700] = f64::NAN;
+    let time: Vec<f64> = (0..3000).map(|row| 0.1 * row as f64 + if row > 2000 { 5.0 } else { 0.0 }).collect();
+    folder.write("a.csv", csv(&[("t", &time), ("u", &u), ("y", &y)]));
+    let other = Experiment::new(500);
+    folder.write("b.csv", csv(&[("t", &time[..500]), ("u", &other.u), ("y", &other.y)]));
+    for model in
+        ["--na 3 --nb 2", "--model ar --na 2", "--na 1 --nb 1 --constant no --detrend none", "--na 0 --nb 30"]
+    {
+        let whole = folder.fit(&format!("a.csv b.csv --time t {model}"));
+        let stream = folder.fit(&format!("a.csv b.csv --time t {model} --stream"));
+        assert!(deviation(&whole, &stream) < 1e-12, "{model}");
+        assert_eq!(number(&whole, "/estimation/samples"), number(&stream, "/estimation/samples"), "{model}");
+        assert_eq!(stream["data"]["segments"], whole["data"]["segments"], "{model}");
+        assert_eq!(stream["data"]["time_gaps"], json!(1), "{model}");
+    }
+}
+
+#[test]
+fn what_one_pass_cannot_do_is_refused() {
+    let folder = Folder::with_log(plain_log());
+    folder.write("word.csv", "u,y\n1,2\n3,4\n5,six\n");
+    folder.write("back.csv", "t,u,y\n0,1,2\n1,3,4\n0.5,5,6\n");
+    folder.write("header.csv", "u,y\n");
+    folder.write("other.csv", "u1,u2,y\n1,2,3\n4,5,6\n7,8,8\n");
+    for (line, code, why) in [
+        ("log.csv", 2, "give its orders"),
+        ("log.csv --na 1..3 --nb 2", 2, "give its orders"),
+        ("log.csv --model oe --nb 2 --nf 2", 2, "C, D or F"),
+        ("log.csv --model ss --order 2", 2, "--stream is for ARX"),
+        ("log.csv --na 2 --nb 2 --html page.html", 2, "--html"),
+        ("log.csv --na 2 --nb 2 --split 60/20/20", 2, "all rows of a piece"),
+        ("log.csv --na 2 --nb 2 --detrend linear", 2, "mean or none"),
+        ("log.csv --na 2 --nb 2 --norm 1", 2, "least squares"),
+        ("log.csv --na 2 --nb 2 --time t --resample 0.1:hold", 2, "--resample"),
+        ("word.csv --na 1 --nb 1", 3, "word.csv:4:3: column 'y': \"six\""),
+        ("back.csv --na 1 --nb 1 --time t", 3, "back.csv:4: "),
+        ("header.csv --na 1 --nb 1", 3, "no data rows"),
+        ("none.csv --na 1 --nb 1", 5, "none.csv"),
+        ("log.csv other.csv --na 1 --nb 1", 3, "other.csv"),
+        ("log.csv --na 400 --nb 400", 4, "too few rows"),
+    ] {
+        let run = folder.run(&format!("fit {line} --stream --report model.json"));
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(why), "{line}: {}", run.stderr);
+        assert!(!folder.names().contains(&"model.json".to_owned()), "{line}");
+    }
+}

@@ -80,10 +80,10 @@ def column(argument: str, value: Any) -> Array:
 def series(argument: str, values: nw.Series[Any]) -> Array:
     """Numbers of a series, as `array` makes them; `argument` may say which column it is."""
     native = values.to_native()
-    encoded = getattr(native, "type", None)
-    if values.dtype == nw.Categorical and hasattr(encoded, "value_type"):
+    encoded = getattr(getattr(native, "type", None), "value_type", None)
+    if values.dtype == nw.Categorical and encoded is not None:
         # A dictionary of PyArrow, of numbers perhaps.
-        native = native.cast(encoded.value_type)
+        native = native.cast(encoded)
         values = nw.from_native(native, series_only=True)
     dtype = getattr(native, "dtype", None)
     if values.dtype == nw.Object or values.dtype == nw.Unknown or dtype == object:

@@ -168,7 +168,8 @@ fn every_kind_of_number_is_read() {
     let table = batch(&columns.iter().map(|(name, array, _)| (*name, Arc::clone(array))).collect::<Vec<_>>());
     let names: Vec<&str> = columns.iter().map(|(name, ..)| *name).collect();
     for format in FORMATS {
-        let found = read(&bytes(format, std::slice::from_ref(&table)), &names, None, &Options::default()).unwrap();
+        let found =
+            read(&bytes(format, std::slice::from_ref(&table)), &names, None, &Options::default()).unwrap();
         assert_eq!((found.rows, found.time, found.start, found.words), (3, None, None, vec![]));
         for ((name, _, expected), values) in columns.iter().zip(&found.columns) {
             assert_eq!(shown(values), expected, "{format} {name}");
@@ -492,6 +493,9 @@ fn every_compression_is_unpacked() {
     }
     for bytes in files {
         assert!(bytes.len() < 20_000);
-        assert_eq!(read(&bytes, &["y"], None, &Options::default()).unwrap().columns, std::slice::from_ref(&values));
+        assert_eq!(
+            read(&bytes, &["y"], None, &Options::default()).unwrap().columns,
+            std::slice::from_ref(&values)
+        );
     }
 }

@@ -25,7 +25,7 @@ fn data(name: &str) -> PathBuf {
 fn folder() -> Folder {
     let folder = Folder::new();
     for name in FILES.map(|(name, _)| name).into_iter().chain(["log.csv"]) {
-        folder.write(name, fs::read(data(name)).unwrap());
+        folder.write(name, fs::read(data(name)).expect("a log"));
     }
     folder
 }
@@ -86,7 +86,7 @@ fn a_pipe_may_bring_a_stream() {
     let options = "--time when --na 1 --nb 1 --quiet --format csv";
     let expected = folder.done(&format!("track log.csv {options}")).stdout;
     for (name, _) in FILES {
-        let run = folder.run_on(&format!("track - {options}"), fs::read(data(name)).unwrap());
+        let run = folder.run_on(&format!("track - {options}"), fs::read(data(name)).expect("a log"));
         if !name.ends_with(".arrows") {
             assert!(run.refusal().contains("cannot come through a pipe; name the file"), "{}", run.stderr);
         } else {

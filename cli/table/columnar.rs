@@ -83,7 +83,7 @@ impl Columns {
             let all = self.names.len();
             return Err(self.error(format!("there is no column {}; select from the first {all}", beyond + 1)));
         }
-        if let Some([twice, _]) = fields.array_windows().find(|[one, other]| one == other) {
+        if let Some([twice, ..]) = fields.windows(2).find(|pair| pair.first() == pair.last()) {
             return Err(self.error(format!("{} is selected twice; select it once", self.said(*twice))));
         }
         for &index in &selection.columns {

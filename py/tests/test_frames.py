@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import thetahat as th
 from thetahat import _frames
 
 NAN = float("nan")
@@ -267,3 +268,55 @@ def test_decimals_of_polars() -> None:
     polars = pytest.importorskip("polars")
     values = [decimal.Decimal("1.5"), None]
     np.testing.assert_array_equal(read(polars.DataFrame({"x": values})), [1.5, NAN])
+
+
+def address(array: Any) -> int:
+    return int(array.__array_interface__["data"][0])
+
+
+def test_what_lies_well_is_not_copied() -> None:
+    pa, pl = pytest.importorskip("pyarrow"), pytest.importorskip("polars")
+    values = np.arange(1000.0)
+    polars = pl.DataFrame({"y": values})
+    table = pa.table({"y": values})
+    batch = table.to_batches()[0]
+    for frame, there in [
+        (polars, address(polars["y"].to_numpy())),
+        (table, table["y"].chunk(0).buffers()[1].address),
+        (batch, batch["y"].buffers()[1].address),
+        (OnlyCapsule(table), table["y"].chunk(0).buffers()[1].address),
+    ]:
+        assert address(_frames.columns(frame, ["y"])["y"]) == there, type(frame)
+        log = th.Log.from_dataframe(frame, output="y", sample_time=1.0)
+        assert np.array_equal(log.y, values)
+    # In pieces, or with nulls, a column is put together once.
+    pieces = pa.table({"y": pa.chunked_array([values[:300], values[300:]])})
+    assert np.array_equal(_frames.columns(pieces, ["y"])["y"], values)
+    nulls = pa.table({"y": pa.array([1.0, None, 3.0])})
+    assert np.array_equal(_frames.columns(nulls, ["y"])["y"], [1.0, np.nan, 3.0], equal_nan=True)
+
+
+class OnlyCapsule:
+    """A table of a library that nobody knows, with the PyCapsule interface of Arrow."""
+
+    def __init__(self, table: Any) -> None:
+        self.table = table
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        return self.table.__arrow_c_stream__(requested_schema)
+
+
+def test_record_batches_and_capsules_are_frames() -> None:
+    pa = pytest.importorskip("pyarrow")
+    when = pa.array([0, 500, 1000], pa.timestamp("ms", "Europe/Berlin"))
+    table = pa.table({"u": pa.array([1, 0, 1]).dictionary_encode(), "y": [0.0, 0.5, 0.25], "when": when})
+    for frame in (table, table.to_batches()[0], OnlyCapsule(table)):
+        log = th.Log.from_dataframe(frame, inputs="u", output="y", time="when")
+        assert repr(log) == (
+            "Log(3 rows, inputs u, output y, sample time 0.5 s by column 'when' from 1970-01-01T01:00:00+01:00)"
+        )
+        assert log.u[:, 0].tolist() == [1.0, 0.0, 1.0]
+    with pytest.raises(TypeError, match="expected a dataframe"):
+        th.Log.from_dataframe(OnlyCapsule(table["y"]), output="y")
+    with pytest.raises(ValueError, match="two columns"):
+        th.Log.from_dataframe(pa.RecordBatch.from_arrays([pa.array([1.0]), pa.array([2.0])], ["y", "y"]), output="y")

@@ -332,3 +332,23 @@ def test_arrays_may_begin_anywhere() -> None:
         own = bytearray(b"x" + buffer.raw())
         moved.append(memoryview(own)[1:])
     assert pickle.loads(text, buffers=moved) == log
+
+
+def test_files_in_columns(tmp_path: Path) -> None:
+    folder = Path(__file__).parents[2] / "tests" / "data" / "columnar"
+    expected = th.read_log(folder / "log.csv", time="when")
+    for path in [*folder.glob("*.parquet"), *folder.glob("*.arrow*")]:
+        log = th.read_log(path, time="when")
+        assert np.array_equal(log.y, expected.y, equal_nan=True) and np.array_equal(log.u, expected.u), path
+        assert log.sample_time == expected.sample_time
+        assert "column 4 ('note') is left out: it holds no numbers" in th.inspect(path, time="when").warnings
+        with pytest.raises(ValueError, match="column 'note' holds texts"):
+            th.read_log(path, inputs="note", time="when")
+        with pytest.warns(UserWarning, match="column 'when' looks like a clock"):
+            th.read_log(path)
+        with pytest.raises(ValueError, match="--delimiter|delimiter"):
+            th.read_csv(path, delimiter=";")
+    short = tmp_path / "short.parquet"
+    short.write_bytes((folder / "polars.parquet").read_bytes()[:-9])
+    with pytest.raises(ValueError, match="no whole Parquet file"):
+        th.read_log(short)

@@ -168,7 +168,8 @@ fn every_kind_of_number_is_read() {
     let table = batch(&columns.iter().map(|(name, array, _)| (*name, Arc::clone(array))).collect::<Vec<_>>());
     let names: Vec<&str> = columns.iter().map(|(name, ..)| *name).collect();
     for format in FORMATS {
-        let found = read(&bytes(format, &[table.clone()]), &names, None, &Options::default()).unwrap();
+        let found =
+            read(&bytes(format, std::slice::from_ref(&table)), &names, None, &Options::default()).unwrap();
         assert_eq!((found.rows, found.time, found.start, found.words), (3, None, None, vec![]));
         for ((name, _, expected), values) in columns.iter().zip(&found.columns) {
             assert_eq!(shown(values), expected, "{format} {name}");
@@ -275,7 +276,7 @@ fn times_have_units_and_zones() {
             if format == "parquet" && kind == "Date64" {
                 continue;
             }
-            let bytes = bytes(format, &[table.clone()]);
+            let bytes = bytes(format, std::slice::from_ref(&table));
             let found = read(&bytes, &["y"], Some("when"), &Options::default()).unwrap();
             let time = found.time.unwrap();
             assert_eq!((time[1] - time[0], found.start.as_deref()), (step, start), "{format} {kind}");
@@ -363,7 +364,7 @@ fn columns_that_hold_no_numbers_are_known_and_refused() {
         ("y2", numbers([2.0])),
     ]);
     for format in FORMATS {
-        let bytes = bytes(format, &[table.clone()]);
+        let bytes = bytes(format, std::slice::from_ref(&table));
         let log = written(&bytes);
         let reader = Reader::open(&log.path, &Options::default()).unwrap();
         assert_eq!(reader.words(), [true, true, true, true, true, false, false]);
@@ -492,6 +493,9 @@ fn every_compression_is_unpacked() {
     }
     for bytes in files {
         assert!(bytes.len() < 20_000);
-        assert_eq!(read(&bytes, &["y"], None, &Options::default()).unwrap().columns, [values.clone()]);
+        assert_eq!(
+            read(&bytes, &["y"], None, &Options::default()).unwrap().columns,
+            std::slice::from_ref(&values)
+        );
     }
 }

@@ -2,7 +2,10 @@
 
 A contiguous array of float64 does not come here: it is read where it lies. Narwhals reads the series and frames of pandas,
 Polars, PyArrow and Modin alike. It has no dependencies and needs none of them installed. No protocol does this: pandas 3.1
-deprecates `__dataframe__` and needs PyArrow for `__arrow_c_stream__`, Polars 2 has only the latter.
+deprecates `__dataframe__` and needs PyArrow for `__arrow_c_stream__`, Polars 2 has only the latter. What has the latter and is none
+of these is taken for a table by it.
+
+A column of float64 in one piece and without nulls is read where its library keeps it; any other is copied once.
 """
 
 from __future__ import annotations
@@ -77,6 +80,11 @@ def column(argument: str, value: Any) -> Array:
 def series(argument: str, values: nw.Series[Any]) -> Array:
     """Numbers of a series, as `array` makes them; `argument` may say which column it is."""
     native = values.to_native()
+    encoded = getattr(getattr(native, "type", None), "value_type", None)
+    if values.dtype == nw.Categorical and encoded is not None:
+        # A dictionary of PyArrow, of numbers perhaps.
+        native = native.cast(encoded)
+        values = nw.from_native(native, series_only=True)
     dtype = getattr(native, "dtype", None)
     if values.dtype == nw.Object or values.dtype == nw.Unknown or dtype == object:
         # Objects, or a type of NumPy that the frame's library only stores.
@@ -120,6 +128,8 @@ def of_library(argument: str, value: Any) -> Any:
         return value
     try:
         native = nw.from_native(value, eager_only=True, allow_series=True, pass_through=True)
+        if native is value:
+            native = _of_capsule(value)
         # Whether names are there twice is seen only here for some.
         names = native.columns if isinstance(native, nw.DataFrame) else []
     except DuplicateError as error:
@@ -129,6 +139,25 @@ def of_library(argument: str, value: Any) -> Any:
         message = f"{argument}: two columns have the name {twice(names)!r}; rename one"
         raise ValueError(message)
     return native
+
+
+def _of_capsule(value: Any) -> Any:
+    """A table of a library that gives it by the PyCapsule interface of Arrow, such as a record batch: without a copy, in the clothes
+    of PyArrow or Polars, whichever is installed. Anything else as it is: a lazy frame too, whose work is asked for by who has it.
+    """
+    if not hasattr(value, "__arrow_c_stream__") or hasattr(value, "collect"):
+        return value
+    for library in ("pyarrow", "polars"):
+        try:
+            return nw.from_arrow(value, backend=library)
+        except ImportError:
+            continue
+        except DuplicateError:
+            raise
+        except (TypeError, ValueError):
+            # A stream of something else than tables.
+            return value
+    return value
 
 
 def twice(names: Sequence[Any]) -> Any:

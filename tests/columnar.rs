@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use crate::harness::Folder;
+use crate::harness::{Folder, distance, parameters};
 
 /// The files beside log.csv, and whether their times name no offset from UTC, so that the first is written in it.
 const FILES: [(&str, bool); 6] = [
@@ -131,4 +131,15 @@ fn what_they_do_not_hold_is_refused() {
     refused("fit short.arrow --na 1 --nb 1", "short.arrow: this is no whole Arrow file");
     folder.write("short.arrows", &fs::read(data("polars.arrows")).unwrap()[..1500]);
     refused("fit short.arrows --na 1 --nb 1", "short.arrows: it ends too early");
+}
+
+#[test]
+fn they_are_read_part_by_part_too() {
+    let folder = folder();
+    let text = folder.fit("log.csv --time when --na 1 --nb 1");
+    for (name, _) in FILES {
+        let stream = folder.fit(&format!("{name} --time when --na 1 --nb 1 --stream"));
+        assert!(distance(&parameters(&stream), &parameters(&text)) < 1e-12, "{name}");
+        assert_eq!(stream["data"]["rows"], text["data"]["rows"], "{name}");
+    }
 }

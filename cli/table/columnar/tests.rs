@@ -191,7 +191,7 @@ fn batches_and_row_groups_follow_one_another() {
         assert_eq!(table.rows, 50_000);
         assert!(table.columns[1].iter().enumerate().all(|(row, n)| *n == row as f64), "{format}");
         assert!(table.columns[0].iter().enumerate().all(|(row, y)| *y == row as f64 / 8.0), "{format}");
-        assert_eq!(table.lines.place("log", 6), "log: row 7");
+        assert_eq!(table.lines.place("log", 6, 0), "log: row 7");
         // Row by row they are the same.
         let log = written(&bytes);
         let reader = Reader::open_live(&log.path, &Options::default()).unwrap();

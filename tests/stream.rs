@@ -73,6 +73,16 @@ fn gaps_clocks_and_several_logs_are_what_they_are() {
 }
 
 #[test]
+fn a_plant_that_rests_for_long_is_no_piece_given_twice() {
+    let Experiment { mut u, mut y, .. } = Experiment::new(2000);
+    u.resize(ROWS * 2, 3.0);
+    y.resize(ROWS * 2, 7.0);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let (whole, stream) = (folder.fit("log.csv --na 2 --nb 2"), folder.fit("log.csv --na 2 --nb 2 --stream"));
+    assert!(deviation(&whole, &stream) < 1e-9);
+}
+
+#[test]
 fn what_one_pass_cannot_do_is_refused() {
     let folder = Folder::with_log(plain_log());
     folder.write("word.csv", "u,y\n1,2\n3,4\n5,six\n");

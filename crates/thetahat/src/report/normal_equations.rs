@@ -207,12 +207,22 @@ impl NormalEquations {
                 other.sample_time, self.sample_time
             )));
         }
-        let twice =
-            |digests: &&BTreeMap<String, String>| !digests.is_empty() && self.digests.contains(digests);
-        if let Some(place) = other.digests.iter().position(|digests| twice(&digests)) {
-            let called = other.logs.get(place).filter(|_| other.logs.len() == other.digests.len());
-            let called =
-                called.map_or_else(|| format!("number {}", place + 1), |log| format!("'{}'", log.file));
+        let file = |of: &Self, place: usize| {
+            let log = of.logs.get(place).filter(|_| of.logs.len() == of.digests.len());
+            log.map(|log| log.file.clone())
+        };
+        // Under another name the same values are those of a plant that rests.
+        let twice = |place: &usize| {
+            let (digests, called) = (&other.digests[*place], file(other, *place));
+            let known = |(own, known): (usize, &BTreeMap<String, String>)| {
+                known == digests
+                    && file(self, own).is_none_or(|own| called.as_ref().is_none_or(|file| *file == own))
+            };
+            !digests.is_empty() && self.digests.iter().enumerate().any(known)
+        };
+        if let Some(place) = (0..other.digests.len()).find(twice) {
+            let called = file(other, place)
+                .map_or_else(|| format!("number {}", place + 1), |file| format!("'{file}'"));
             return Err(Error::data(format!(
                 "a piece is given twice: {called} of the second ones is among the first ones already; merge each piece once"
             )));

@@ -150,7 +150,7 @@ pub(crate) fn in_pieces<T>(
     let mut waiting: Option<Table> = None;
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
-    reader.read_parts(&selection, most, &mut update, &mut |mut part: Table| {
+    reader.read_parts(&selection, Some(most), &mut update, &mut |mut part: Table| {
         for word in std::mem::take(&mut part.words) {
             if !words.contains(&word) {
                 words.push(word);

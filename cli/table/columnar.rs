@@ -149,21 +149,7 @@ impl ColumnarReader {
         kinds.filter(|(_, kind)| is_time(kind)).map(|(index, _)| index).collect()
     }
 
-    /// Reads the selected columns of all rows; see [`Reader::read`](super::Reader::read).
-    pub(super) fn read(
-        self,
-        selection: &Selection,
-        progress: &mut dyn FnMut(u64, Option<u64>),
-    ) -> Result<Table, Error> {
-        let mut whole = Table::default();
-        self.read_parts(selection, None, progress, &mut |table| {
-            whole = table;
-            Ok::<(), Error>(())
-        })?;
-        Ok(whole)
-    }
-
-    /// The same in parts of `most` rows, or a little more; none: in one.
+    /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
     pub(super) fn read_parts<E: From<Error>>(
         self,
         selection: &Selection,

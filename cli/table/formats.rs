@@ -98,26 +98,27 @@ impl Reader {
         selection: &Selection,
         progress: &mut dyn FnMut(u64, Option<u64>),
     ) -> Result<Table, Error> {
-        match self {
-            Self::Text(reader) => reader.read(selection, progress),
-            #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.read(selection, progress),
-        }
+        let mut whole = Table::default();
+        self.read_parts(selection, None, progress, &mut |table| {
+            whole = table;
+            Ok::<(), Error>(())
+        })?;
+        Ok(whole)
     }
 
-    /// Reads the selected columns, and gives them part by part, each with `most` rows or a little more, the last one with what is
-    /// left: memory does not grow with the rows. Else as [`read`](Self::read).
+    /// The same in parts, each with `most` rows or a little more, the last one with what is left: memory does not grow with the
+    /// rows. None: all in one.
     pub(crate) fn read_parts<E: From<Error>>(
         self,
         selection: &Selection,
-        most: usize,
+        most: Option<usize>,
         progress: &mut dyn FnMut(u64, Option<u64>),
         take: &mut dyn FnMut(Table) -> Result<(), E>,
     ) -> Result<(), E> {
         match self {
-            Self::Text(reader) => reader.read_parts(selection, Some(most), progress, take),
+            Self::Text(reader) => reader.read_parts(selection, most, progress, take),
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.read_parts(selection, Some(most), progress, take),
+            Self::Columnar(reader) => reader.read_parts(selection, most, progress, take),
         }
     }
 

@@ -198,24 +198,7 @@ impl TextReader {
         self.undecoded_names.iter().map(|(column, _)| *column)
     }
 
-    /// Reads the selected columns of all rows.
-    ///
-    /// `progress` is called once a block with the number of bytes read so far, and of how many if that is
-    /// known. Both count what is stored, before it is unpacked.
-    pub(crate) fn read(
-        self,
-        selection: &Selection,
-        progress: &mut dyn FnMut(u64, Option<u64>),
-    ) -> Result<Table, Error> {
-        let mut whole = Table::default();
-        self.read_parts(selection, None, progress, &mut |table| {
-            whole = table;
-            Ok::<(), Error>(())
-        })?;
-        Ok(whole)
-    }
-
-    /// The same in parts of `most` rows, or a little more; none: in one.
+    /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
     pub(super) fn read_parts<E: From<Error>>(
         self,
         selection: &Selection,

@@ -17,6 +17,13 @@ mod stream;
 /// Blocks and pieces so small that rows, fields and numbers are cut everywhere.
 const TINY: [(usize, usize); 6] = [(1, 1), (2, 1), (7, 3), (16, 5), (64, 16), (1000, 40)];
 
+impl TextReader {
+    /// Behind the front of all formats.
+    fn read(self, selection: &Selection, progress: &mut dyn FnMut(u64, Option<u64>)) -> Result<Table, Error> {
+        Reader::Text(Box::new(self)).read(selection, progress)
+    }
+}
+
 fn sizes(block: usize, piece: usize) -> Sizes {
     Sizes { block, piece, ..SIZES }
 }

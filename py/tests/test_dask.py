@@ -139,8 +139,8 @@ def test_one_model_from_many_pieces(client: Any, tmp_path: Path) -> None:
         frame[250 * number : 250 * (number + 1)].to_parquet(path)
     sums = thetahat.dask.normal_equations(paths, read={"time": "t"}, **ORDERS).compute()
     assert sums.samples == 998
-    assert close(sums.solve(), th.arx(th.read_log(paths[0], time="t"), **ORDERS)) is False
-    assert np.allclose(sums.solve().parameters, whole.parameters, rtol=1e-9)
+    assert close(sums.solve(), whole)
+    assert abs(sums.solve().sample_time / 0.01 - 1) < 1e-4
     together = dask.dataframe.from_pandas(MOTOR.to_pandas().reset_index(names="t"), npartitions=3)
     read = {"inputs": "u", "output": "y", "time": "t"}
     assert close(thetahat.dask.normal_equations(together, read=read, **ORDERS).compute().solve(), whole)
@@ -160,10 +160,10 @@ def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
         return str(caught.value)
 
     assert refusal({"first": one, "none": two[:0]}).startswith("none: ")
-    assert "clock goes back" in refusal({"first": two, "second": one}) or "second: " in refusal({"first": two, "second": one})
-    assert "twice" in refusal({"first": one, "second": two, "again": two}) or "again: " in refusal(
-        {"first": one, "second": two, "again": two}
-    )
+    assert "goes back" in refusal({"first": two, "second": one})
+    assert "goes back" in refusal({"first": one, "second": two, "again": two})
+    with pytest.raises(ValueError, match="given twice"):
+        thetahat.dask.normal_equations([MOTOR[:500], MOTOR[:500]], experiments=True, **ORDERS).compute()
     assert refusal({"first": one, "other": two.rename(columns={"u": "v"})}).startswith("other: ")
     with pytest.raises(ValueError, match="na"):
         thetahat.dask.normal_equations([MOTOR]).compute()

@@ -39,8 +39,8 @@ __all__ = ["fit_many", "normal_equations", "rows"]
 
 Logs = Union[str, Iterable[Any], Mapping[str, Any], "dask.bag.Bag", "dask.dataframe.DataFrame"]
 
-_TASKS = 1000
-"""A task has more than one log where there would be more tasks than this."""
+_TASKS = 16
+"""A task has one log unless each worker has more tasks than this: the scheduler takes some milliseconds for a task."""
 _MOST = 32
 """The logs of a task, at most: so many are done again when a worker is lost."""
 
@@ -73,7 +73,7 @@ def fit_many(
     reports : path or URL, optional
         A folder that all workers see, for the document of each.
     per_task : int, optional
-        How many logs a task has. Unless said otherwise one, and more where there are thousands of logs.
+        How many logs a task has. Unless said otherwise one, and more where there are many for each worker.
 
     Returns
     -------
@@ -183,10 +183,10 @@ def normal_equations(
         named = _many.name_all(logs)
     lags = 0 if experiments else _lags(**orders)
     loaded = [dask.delayed(_loaded)(work, name, item) for name, item in named]
-    tails = [dask.delayed(_tail)(log, lags) for log in loaded[:-1]] if lags else [None] * (len(loaded) - 1)
-    sums = [
-        dask.delayed(_sums)(name, log, tail, orders) for (name, _), log, tail in zip(named, loaded, [None, *tails])
-    ]
+    tails: list[Any] = [None]
+    for log in loaded[:-1]:
+        tails.append(dask.delayed(_tail)(tails[-1], log, lags) if lags else None)
+    sums = [dask.delayed(_sums)(name, log, tail, orders) for (name, _), log, tail in zip(named, loaded, tails)]
     while len(sums) > 1:
         sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
     return sums[0]
@@ -202,22 +202,24 @@ def _lags(
 
 
 def _loaded(work: _many.Work, name: str, item: Any) -> pandas.DataFrame:
-    """A piece as a frame, with its roles and its clock among its attributes."""
+    """A piece as a frame, with its roles and its sample time among its attributes; the index are the times, from one origin for all."""
     with _in_piece(name), _said.kept():
         log = work.log(name, item)
-    frame = log.to_pandas()
+    has_clock = log._log.time() is not None
     _, start = log._log.clock
-    if start is not None and not isinstance(frame.index, pandas.DatetimeIndex):
-        # A file's times count from its first one.
-        frame.index = pandas.to_datetime(start) + pandas.to_timedelta(log.time, unit="s")
+    origin = 0.0 if start is None else pandas.to_datetime(start, utc=True).timestamp()
+    frame = pandas.DataFrame(
+        {channel: log._log.values(channel) for channel in [*log.inputs, *log.outputs]}, index=origin + log.time
+    )
     # Without a clock the index says nothing of the time from one piece to the next.
-    step = None if log._log.time() is not None else log.sample_time
-    frame.attrs = {"inputs": log.inputs, "output": log.outputs, "sample_time": step}
+    frame.attrs = {"inputs": log.inputs, "output": log.outputs, "sample_time": None if has_clock else log.sample_time}
     return frame
 
 
-def _tail(frame: pandas.DataFrame, lags: int) -> pandas.DataFrame:
-    return frame.iloc[-lags:].copy()
+def _tail(before: pandas.DataFrame | None, frame: pandas.DataFrame, lags: int) -> pandas.DataFrame:
+    """The last rows of a piece, and of those before it where it is short."""
+    last = frame.iloc[-lags:]
+    return last.copy() if before is None or len(last) == lags else pandas.concat([before, last]).iloc[-lags:]
 
 
 def _sums(name: str, frame: pandas.DataFrame, tail: pandas.DataFrame | None, orders: Mapping[str, Any]) -> _NormalEquations:
@@ -229,9 +231,8 @@ def _sums(name: str, frame: pandas.DataFrame, tail: pandas.DataFrame | None, ord
                 raise ValueError(f"its columns are {', '.join(frame.columns)}, those of the piece before it {', '.join(tail.columns)}")
             whole = frame if tail is None else pandas.concat([tail, frame])
             step = roles["sample_time"]
-            clock = {"time": whole.index} if step is None else {"sample_time": step}
-            if step is not None:
-                whole = whole.reset_index(drop=True)
+            clock = {"time": whole.index.to_numpy()} if step is None else {"sample_time": step}
+            whole = whole.reset_index(drop=True)
             log = Log.from_dataframe(whole, inputs=roles["inputs"], output=roles["output"], **clock)
             return _NormalEquations(log, past=0 if tail is None else len(tail), **orders)
     finally:
@@ -265,16 +266,21 @@ def _tasks(
     named = _many.name_all(logs)
     files = _many.reports_of([name for name, _ in named], named, reports)
     triples = [(name, item, file) for (name, item), file in zip(named, files)]
-    count = min(_MOST, -(-len(triples) // _TASKS)) if per_task is None else per_task
+    count = max(1, min(_MOST, len(triples) // (_TASKS * _workers()))) if per_task is None else per_task
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise ValueError(f"per_task={per_task!r}: give a number from 1 on")
     tasks = [triples[first : first + count] for first in range(0, len(triples), count)]
-    return [dask.delayed(_each)(work, _in_one(task), None) for task in tasks]
+    return [dask.delayed(_each)(work, task, None) for task in tasks]
 
 
-def _in_one(task: Sequence[tuple[str, Any, str | None]]) -> Any:
-    """The logs of a task: Dask looks for delayed objects only where there are some."""
-    return list(task) if any(isinstance(item, Delayed) for _, item, _ in task) else dask.delayed(list(task), traverse=False)
+def _workers() -> int:
+    """How many tasks run at the same time on the cluster; without one, as many as there are cores."""
+    try:
+        from distributed import get_client
+
+        return sum(get_client().nthreads().values()) or 1
+    except (ImportError, ValueError):
+        return os.cpu_count() or 1
 
 
 def _each(work: _many.Work, task: Iterable[tuple[str, Any, str | None]], folder: str | None) -> list[dict[str, Any]]:

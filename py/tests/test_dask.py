@@ -43,6 +43,7 @@ def test_the_rows_are_those_of_one_process(client: Any, tmp_path: Path) -> None:
     for per_task in (None, 4):
         table = thetahat.dask.fit_many(logs, **orders, reports=tmp_path / "out", per_task=per_task).compute()
         assert rows(table) == expected.rows
+        assert list(table.index) == list(range(len(logs)))
         assert list(table.columns) == list(expected.to_pandas().columns)
     assert (table["exit_code"] != 0).sum() == len(BROKEN)
     assert Path(table["report"].dropna().iloc[0]).is_file()
@@ -120,7 +121,7 @@ ORDERS: dict[str, Any] = {"na": 2, "nb": 2, "nk": 1}
 
 
 def close(one: th.Model, other: th.Model) -> bool:
-    pairs = [(one.parameters, other.parameters), (one.standard_errors, other.standard_errors), (one.mse, other.mse)]
+    pairs: list[tuple[Any, Any]] = [(one.parameters, other.parameters), (one.standard_errors, other.standard_errors), (one.mse, other.mse)]
     return all(np.allclose(a, b, rtol=1e-12, atol=0) for a, b in pairs)
 
 

@@ -12,8 +12,8 @@ the same rows, whatever the workers.
 ...     table = thetahat.dask.fit_many({"first": motor[:500], "second": motor[500:]}, th.arx, na=2, nb=2).compute()
 >>> table[["log", "model", "dc_gain"]].round(2)
       log         model  dc_gain
-0   first  ARX(2, 2, 1)    18.77
-1  second  ARX(2, 2, 1)    18.88
+0   first  ARX(2, 2, 1)     18.6
+1  second  ARX(2, 2, 1)    19.35
 """
 
 from __future__ import annotations
@@ -102,13 +102,15 @@ def fit_many(
     """
     parts = dask.persist(*_tasks(logs, _many.Work(fit, options, dict(read or {})), by, reports, per_task))
     heads = dask.compute(*[dask.delayed(_head)(part) for part in parts])
-    if all(wrong is not None for _, wrong in heads):
-        raise ValueError(heads[0][1])
-    kinds = [own for own, _ in heads]
+    if all(wrong is not None for _, _, wrong in heads):
+        raise ValueError(heads[0][2])
+    kinds = [own for own, _, _ in heads]
+    firsts = numpy.cumsum([0, *(count for _, count, _ in heads)])
     names = _many.columns(kinds)
     types = {name: _type(set().union(*[own.get(name, ()) for own in kinds])) for name in names}
     meta = pandas.DataFrame({name: pandas.Series([], dtype=kind) for name, kind in types.items()})
-    return dask.dataframe.from_delayed([dask.delayed(_frame)(part, types) for part in parts], meta=meta, verify_meta=False)
+    frames = [dask.delayed(_frame)(part, int(first), types) for part, first in zip(parts, firsts)]
+    return dask.dataframe.from_delayed(frames, meta=meta, verify_meta=False)
 
 
 def rows(
@@ -201,40 +203,46 @@ def _lags(
     return max(na or 0, first + count - 1 if count else 0)
 
 
-def _loaded(work: _many.Work, name: str, item: Any) -> pandas.DataFrame:
-    """A piece as a frame, with its roles and its sample time among its attributes; the index are the times, from one origin for all."""
+def _loaded(work: _many.Work, name: str, item: Any) -> Log:
     with _in_piece(name), _said.kept():
-        log = work.log(name, item)
-    has_clock = log._log.time() is not None
-    _, start = log._log.clock
-    origin = 0.0 if start is None else pandas.to_datetime(start, utc=True).timestamp()
-    frame = pandas.DataFrame(
-        {channel: log._log.values(channel) for channel in [*log.inputs, *log.outputs]}, index=origin + log.time
-    )
-    # Without a clock the index says nothing of the time from one piece to the next.
-    frame.attrs = {"inputs": log.inputs, "output": log.outputs, "sample_time": None if has_clock else log.sample_time}
-    return frame
+        return work.log(name, item)
 
 
-def _tail(before: pandas.DataFrame | None, frame: pandas.DataFrame, lags: int) -> pandas.DataFrame:
+def _columns(log: Log, rows: slice = slice(None)) -> dict[str | None, Any]:
+    """Some rows of a piece: a column for each channel; under None the times in seconds, from one origin for all pieces, if it has a clock."""
+    columns: dict[str | None, Any] = {name: log._log.values(name)[rows] for name in [*log.inputs, *log.outputs]}
+    if log._log.time() is not None:
+        _, start = log._log.clock
+        columns[None] = (0.0 if start is None else pandas.to_datetime(start, utc=True).timestamp()) + log.time[rows]
+    return columns
+
+
+def _tail(before: dict[str | None, Any] | None, log: Log, lags: int) -> dict[str | None, Any]:
     """The last rows of a piece, and of those before it where it is short."""
-    last = frame.iloc[-lags:]
-    return last.copy() if before is None or len(last) == lags else pandas.concat([before, last]).iloc[-lags:]
+    last = _columns(log, slice(-lags, None))
+    if before is None or len(log) >= lags:
+        return {name: values.copy() for name, values in last.items()}
+    return {name: numpy.concatenate([before[name], values])[-lags:] for name, values in last.items() if name in before}
 
 
-def _sums(name: str, frame: pandas.DataFrame, tail: pandas.DataFrame | None, orders: Mapping[str, Any]) -> _NormalEquations:
+def _sums(name: str, log: Log, tail: dict[str | None, Any] | None, orders: Mapping[str, Any]) -> _NormalEquations:
     before = _thetahat.threads(_threads())
     try:
         with _in_piece(name):
-            roles = frame.attrs
-            if tail is not None and list(tail.columns) != list(frame.columns):
-                raise ValueError(f"its columns are {', '.join(frame.columns)}, those of the piece before it {', '.join(tail.columns)}")
-            whole = frame if tail is None else pandas.concat([tail, frame])
-            step = roles["sample_time"]
-            clock = {"time": whole.index.to_numpy()} if step is None else {"sample_time": step}
-            whole = whole.reset_index(drop=True)
-            log = Log.from_dataframe(whole, inputs=roles["inputs"], output=roles["output"], **clock)
-            return _NormalEquations(log, past=0 if tail is None else len(tail), **orders)
+            if tail is None:
+                return _NormalEquations(log, **orders)
+            columns = _columns(log)
+            if list(tail) != list(columns):
+                own, other = (", ".join(str(name or "a clock") for name in names) for names in (columns, tail))
+                raise ValueError(f"it has {own}, the piece before it {other}; give all the same columns")
+            past = len(tail[log.outputs[0]])
+            for channel, values in columns.items():
+                columns[channel] = numpy.concatenate([tail[channel], values])
+            clock = {"time": columns[None]} if None in columns else {"sample_time": log.sample_time}
+            whole = Log({name: columns[name] for name in log.outputs}, {name: columns[name] for name in log.inputs} or None, **clock)
+            # The sums are made of the log alone.
+            del columns, clock, values
+            return _NormalEquations(whole, past=past, **orders)
     finally:
         _thetahat.threads(before)
 
@@ -339,15 +347,15 @@ def _groups(work: _many.Work, part: pandas.DataFrame, by: str, time: str, folder
     return _each(work, [(name, log, None) for name, log in logs], folder)
 
 
-def _head(part: Iterable[Mapping[str, Any]]) -> tuple[dict[str, set[type]], str | None]:
-    """The columns of some rows with the types of their values; and what is wrong with the arguments, if that is all they say."""
+def _head(part: Iterable[Mapping[str, Any]]) -> tuple[dict[str, set[type]], int, str | None]:
+    """The columns of some rows with the types of their values; how many there are; what is wrong with the arguments, if that is all."""
     part = list(part)
     kinds: dict[str, set[type]] = {name: set() for name in _many.columns(part)}
     for row in part:
         for name, value in row.items():
             kinds[name].add(type(value))
     wrong = part and all(row["exit_code"] == 2 for row in part)
-    return kinds, part[0]["message"] if wrong else None
+    return kinds, len(part), part[0]["message"] if wrong else None
 
 
 def _type(kinds: set[type]) -> str:
@@ -359,8 +367,8 @@ def _type(kinds: set[type]) -> str:
     return "Float64" if kinds <= {int, float} else "string"
 
 
-def _frame(part: Iterable[Mapping[str, Any]], types: Mapping[str, str]) -> pandas.DataFrame:
+def _frame(part: Iterable[Mapping[str, Any]], first: int, types: Mapping[str, str]) -> pandas.DataFrame:
+    """Some rows as a frame, counted from the first one of all."""
     part = list(part)
-    return pandas.DataFrame(
-        {name: pandas.array([row.get(name) for row in part], dtype=kind) for name, kind in types.items()}
-    )
+    cells = {name: pandas.array([row.get(name) for row in part], dtype=kind) for name, kind in types.items()}
+    return pandas.DataFrame(cells, index=range(first, first + len(part)))

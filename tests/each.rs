@@ -192,6 +192,7 @@ fn what_makes_no_sense_is_refused_before_anything_is_done() {
         ("fit --each --list file --table x.csv", 2, "no log is named"),
         ("fit --each logs/plant00.csv --table logs/plant00.csv", 2, "would be replaced"),
         ("fit --each logs/plant00.csv --table x.csv --reports file", 5, "file"),
+        ("fit --each logs/plant00.csv --table none/x.csv --reports out", 5, "its folder is not there"),
         ("inspect logs/plant00.csv logs/word.csv", 2, "--each"),
         ("inspect --each logs/plant00.csv --table x.csv -o y.json", 2, "--out"),
         ("validate file logs/plant00.csv logs/word.csv", 2, "--each"),

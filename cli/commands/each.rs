@@ -71,6 +71,13 @@ pub(super) fn each(
     common: &str,
     work: impl Fn(&Path) -> Result<Done, Failure> + Sync,
 ) -> Result<(), Failure> {
+    let table = arguments.table.as_deref().unwrap_or(Path::new("-"));
+    // Told now, and not when all is done.
+    if table != Path::new("-")
+        && let Err(error) = fs::metadata(replace::folder(table))
+    {
+        return Err(Failure::io(table, "cannot be written: its folder is not there", &error));
+    }
     let logs = logs::named(patterns, arguments.list.as_deref(), arguments.reports.is_some())?;
     let journal = arguments.reports.as_deref().map(|folder| Journal::open(folder, common)).transpose()?;
     let run = Run {
@@ -94,7 +101,6 @@ pub(super) fn each(
     }
     let Run { rows, .. } = run;
     let rows: Vec<Row> = rows.into_iter().filter_map(OnceLock::into_inner).collect();
-    let table = arguments.table.as_deref().unwrap_or(Path::new("-"));
     write(table, &rows)?;
     let reused = journal.as_ref().map_or(0, Journal::reused);
     end(table, &rows, reused)
@@ -239,9 +245,10 @@ fn end(table: &Path, rows: &[Row], reused: usize) -> Result<(), Failure> {
     };
     let failed: Vec<&Row> = rows.iter().filter(|row| code(row) != 0).collect();
     let mut lines = vec![format!(
-        "{}: {} rows, {} of them without a failure{}",
+        "{}: {} row{}, {} of them without a failure{}",
         if table == Path::new("-") { "table".to_owned() } else { table.display().to_string() },
         rows.len(),
+        if rows.len() == 1 { "" } else { "s" },
         rows.len() - failed.len(),
         if reused > 0 { format!("; {reused} as in an earlier run") } else { String::new() }
     )];

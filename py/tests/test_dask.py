@@ -162,9 +162,16 @@ def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
 
     assert refusal({"first": one, "none": two[:0]}).startswith("none: ")
     assert "goes back" in refusal({"first": two, "second": one})
-    assert "goes back" in refusal({"first": one, "second": two, "again": two})
+    assert "goes back" in refusal({"first": one, "second": two, "again": two.copy()})
     with pytest.raises(ValueError, match="given twice"):
-        thetahat.dask.normal_equations([MOTOR[:500], MOTOR[:500]], experiments=True, **ORDERS).compute()
+        thetahat.dask.normal_equations([MOTOR, MOTOR], experiments=True, **ORDERS)
+    with pytest.raises(ValueError, match="given twice"):
+        thetahat.dask.normal_equations(["a.csv", "b.csv", "a.csv"], **ORDERS)
+    # A plant that rests gives the same values again.
+    rest = th.Log(np.full(300, 7.0), np.full(300, 2.0), sample_time=0.01)
+    pieces = [MOTOR, rest, rest[:], rest[0:]]
+    sums = thetahat.dask.normal_equations(pieces, experiments=True, **ORDERS).compute()
+    assert sums.pieces == 4
     assert refusal({"first": one, "other": two.rename(columns={"u": "v"})}).startswith("other: ")
     with pytest.raises(ValueError, match="na"):
         thetahat.dask.normal_equations([MOTOR]).compute()

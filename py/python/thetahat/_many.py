@@ -284,13 +284,18 @@ def reports_of(
     files: list[str | None] = []
     taken: dict[str, str] = {}
     for name, path in zip(names, below):
-        parts = [part for part in path.parts if part not in ("/", ".", "..")]
-        file = f"{folder}/{'/'.join([*parts[:-1], _ENDINGS.sub('', parts[-1])])}.json" if parts else f"{folder}/log.json"
+        file = report_of(folder, path)
         if file in taken:
             raise ValueError(f"logs: the documents of {taken[file]} and {name} would both be {file}; rename one of the logs")
         taken[file] = name
         files.append(file)
     return files
+
+
+def report_of(folder: str, name: PurePosixPath) -> str:
+    """The file of a document in a folder, and never out of it."""
+    *folders, own = [part for part in name.parts if part not in ("/", ".", "..")] or ["log"]
+    return "/".join([folder, *folders, f"{_ENDINGS.sub('', own) or own}.json"])
 
 
 def _threads(threads: int | None) -> int:

@@ -21,6 +21,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import PurePosixPath
 from typing import Any, Union
 
 import dask
@@ -183,6 +184,12 @@ def normal_equations(
         named = [(f"partition {place}", part) for place, part in enumerate(logs.to_delayed())]
     else:
         named = _many.name_all(logs)
+    known: dict[Any, str] = {}
+    for name, item in named:
+        own = name if isinstance(item, (str, os.PathLike)) else id(item)
+        if own in known:
+            raise ValueError(f"logs: {known[own]} is given twice, the second time as {name}; give each piece once")
+        known[own] = name
     lags = 0 if experiments else _lags(**orders)
     loaded = [dask.delayed(_loaded)(work, name, item) for name, item in named]
     tails: list[Any] = [None]
@@ -204,8 +211,13 @@ def _lags(
 
 
 def _loaded(work: _many.Work, name: str, item: Any) -> Log:
+    """A piece under its name: the same values under another name are those of a plant that rests."""
     with _in_piece(name), _said.kept():
-        return work.log(name, item)
+        return _called(work.log(name, item), name)
+
+
+def _called(log: Log, name: str) -> Log:
+    return Log._of(log._log.called(name), log._clock)
 
 
 def _columns(log: Log, rows: slice = slice(None)) -> dict[str | None, Any]:
@@ -242,7 +254,7 @@ def _sums(name: str, log: Log, tail: dict[str | None, Any] | None, orders: Mappi
             whole = Log({name: columns[name] for name in log.outputs}, {name: columns[name] for name in log.inputs} or None, **clock)
             # The sums are made of the log alone.
             del columns, clock, values
-            return _NormalEquations(whole, past=past, **orders)
+            return _NormalEquations(_called(whole, name), past=past, **orders)
     finally:
         _thetahat.threads(before)
 
@@ -295,7 +307,9 @@ def _each(work: _many.Work, task: Iterable[tuple[str, Any, str | None]], folder:
     """The rows of some logs."""
     before = _thetahat.threads(_threads())
     try:
-        return [work(name, item, f"{folder}/{name}.json" if folder else file)[0] for name, item, file in task]
+        if folder is not None:
+            task = [(name, item, _many.report_of(folder, PurePosixPath(name))) for name, item, _ in task]
+        return [work(name, item, file)[0] for name, item, file in task]
     finally:
         _thetahat.threads(before)
 

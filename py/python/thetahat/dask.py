@@ -144,7 +144,7 @@ def normal_equations(
 ) -> Delayed:
     """The normal equations of one model, of which the workers of Dask have pieces: `thetahat.NormalEquations`, merged as a tree.
 
-    A worker has a few pieces in memory, and hands on some kilobytes. The result is solved where it is wanted:
+    A worker has one piece of a file or two in memory for each of its threads, and hands on some kilobytes. The result is solved where it is wanted:
     ``normal_equations(…).compute().solve()`` is the model that a fit to all rows in one pass gives.
 
     Parameters
@@ -191,11 +191,14 @@ def normal_equations(
             raise ValueError(f"logs: {known[own]} is given twice, the second time as {name}; give each piece once")
         known[own] = name
     lags = 0 if experiments else _lags(**orders)
-    loaded = [dask.delayed(_loaded)(work, name, item) for name, item in named]
-    tails: list[Any] = [None]
-    for log in loaded[:-1]:
-        tails.append(dask.delayed(_tail)(tails[-1], log, lags) if lags else None)
-    sums = [dask.delayed(_sums)(name, log, tail, orders) for (name, _), log, tail in zip(named, loaded, tails)]
+    # A task has some pieces that follow one another, one after the other in memory. The last one is read again for its end.
+    # How many does not depend on the workers: the same pieces give the same bytes.
+    count = max(1, min(_MOST, len(named) // _TASKS))
+    runs = [named[first : first + count] for first in range(0, len(named), count)]
+    pasts: list[Any] = [None]
+    for run in runs[:-1]:
+        pasts.append(dask.delayed(_past)(pasts[-1], dask.delayed(_end)(work, run, lags), lags) if lags else None)
+    sums = [dask.delayed(_sums)(work, run, past, lags, orders) for run, past in zip(runs, pasts)]
     while len(sums) > 1:
         sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
     return sums[0]
@@ -229,34 +232,63 @@ def _columns(log: Log, rows: slice = slice(None)) -> dict[str | None, Any]:
     return columns
 
 
-def _tail(before: dict[str | None, Any] | None, log: Log, lags: int) -> dict[str | None, Any]:
+def _end(work: _many.Work, run: Sequence[tuple[str, Any]], lags: int) -> dict[str | None, Any]:
+    """The last rows of some pieces that follow one another."""
+    end: dict[str | None, Any] | None = None
+    for name, item in reversed(run):
+        last = _columns(_loaded(work, name, item), slice(-lags, None))
+        end = {channel: values.copy() for channel, values in last.items()} if end is None else _past(last, end, lags)
+        if all(len(values) == lags for values in end.values()):
+            break
+    return end or {}
+
+
+def _past(before: dict[str | None, Any] | None, end: dict[str | None, Any], lags: int) -> dict[str | None, Any]:
     """The last rows of a piece, and of those before it where it is short."""
-    last = _columns(log, slice(-lags, None))
-    if before is None or len(log) >= lags:
-        return {name: values.copy() for name, values in last.items()}
-    return {name: numpy.concatenate([before[name], values])[-lags:] for name, values in last.items() if name in before}
+    if before is None:
+        return end
+    return {name: numpy.concatenate([before[name], values])[-lags:] if name in before else values for name, values in end.items()}
 
 
-def _sums(name: str, log: Log, tail: dict[str | None, Any] | None, orders: Mapping[str, Any]) -> _NormalEquations:
+def _sums(
+    work: _many.Work,
+    run: Sequence[tuple[str, Any]],
+    past: dict[str | None, Any] | None,
+    lags: int,
+    orders: Mapping[str, Any],
+) -> _NormalEquations:
+    """The sums of some pieces that follow one another."""
     before = _thetahat.threads(_threads())
+    sums: _NormalEquations | None = None
     try:
-        with _in_piece(name):
-            if tail is None:
-                return _NormalEquations(log, **orders)
-            columns = _columns(log)
-            if list(tail) != list(columns):
-                own, other = (", ".join(str(name or "a clock") for name in names) for names in (columns, tail))
-                raise ValueError(f"it has {own}, the piece before it {other}; give all the same columns")
-            past = len(tail[log.outputs[0]])
-            for channel, values in columns.items():
-                columns[channel] = numpy.concatenate([tail[channel], values])
-            clock = {"time": columns[None]} if None in columns else {"sample_time": log.sample_time}
-            whole = Log({name: columns[name] for name in log.outputs}, {name: columns[name] for name in log.inputs} or None, **clock)
-            # The sums are made of the log alone.
-            del columns, clock, values
-            return _NormalEquations(_called(whole, name), past=past, **orders)
+        for name, item in run:
+            log = _loaded(work, name, item)
+            with _in_piece(name):
+                if past is None:
+                    piece = _NormalEquations(log, **orders)
+                else:
+                    piece = _NormalEquations(_after(past, log, name), past=len(next(iter(past.values()))), **orders)
+            if lags:
+                past = _past(past, _columns(log, slice(-lags, None)), lags)
+            sums = piece if sums is None else sums.merge(piece)
     finally:
         _thetahat.threads(before)
+    if sums is None:
+        raise ValueError("logs: there is none; give at least one piece")
+    return sums
+
+
+def _after(past: dict[str | None, Any], log: Log, name: str) -> Log:
+    """A piece with the rows before it in front."""
+    columns = _columns(log)
+    if list(past) != list(columns):
+        own, other = (", ".join(str(name or "a clock") for name in names) for names in (columns, past))
+        raise ValueError(f"it has {own}, the piece before it {other}; give all the same columns")
+    for channel, values in columns.items():
+        columns[channel] = numpy.concatenate([past[channel], values])
+    clock = {"time": columns[None]} if None in columns else {"sample_time": log.sample_time}
+    outputs, inputs = ({name: columns[name] for name in names} for names in (log.outputs, log.inputs))
+    return _called(Log(outputs, inputs or None, **clock), name)
 
 
 def _merged(*sums: _NormalEquations) -> _NormalEquations:

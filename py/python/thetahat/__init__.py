@@ -26,13 +26,14 @@ from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, gene
 from thetahat._grey_box import GreyBox, grey
 from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
 from thetahat._instrumental import iv, sriv
-from thetahat._log import Log, dc_motor, read_csv, read_log
+from thetahat._log import Log
 from thetahat._many import Fits, fit_many
 from thetahat._model import Model
 from thetahat._narx import narx
 from thetahat._normal_equations import NormalEquations
 from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
 from thetahat._process import process, tf
+from thetahat._read import dc_motor, read_csv, read_log
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._spectrum import MeasuredResponse, spectrum
 from thetahat._state_model import StateModel

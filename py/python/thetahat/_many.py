@@ -13,7 +13,8 @@ from typing import Any, Union
 
 from thetahat import _files, _options, _said, _thetahat
 from thetahat._fit import search
-from thetahat._log import Log, read_csv
+from thetahat._log import Log
+from thetahat._read import read_csv
 
 Item = Union[str, "os.PathLike[str]", Log, Any]
 """A log: a file, a `Log`, or a data frame."""

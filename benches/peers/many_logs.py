@@ -1,9 +1,9 @@
 """Many logs, and one log on many workers: what they take with one worker of Dask and with two, in one run.
 
-    python benches/peers/many_logs.py [LOGS] [PIECES]
+    python benches/peers/many_logs.py [LOGS] [PIECES] [ROWS]
 
 10,000 logs of 1000 rows, among which 1 % are broken, get an ARX model each, chosen among 100; an ARX(8, 8) model is made of as many
-pieces of 10^6 rows in files of Parquet. Prints times, ratios and memory. Needs the wheel of `make wheel` and its extra [dask].
+pieces of 10^6 rows in files of Parquet; 50 experiments of 1000 rows, and of ROWS (400,000), are fitted one OE(2, 2) model. Prints times, ratios and memory. Needs the wheel of `make wheel` and its extra [dask].
 """
 
 from __future__ import annotations
@@ -103,9 +103,49 @@ def one_model(folder: Path, count: int) -> None:
     print(f"  largest difference of a parameter to the fit in one pass {error:.1e}")
 
 
+def make_experiment(path: str, number: int, rows: int) -> None:
+    from scipy.signal import lfilter, lfiltic
+
+    random = np.random.default_rng(number)
+    u, e = random.standard_normal(rows), random.standard_normal(rows)
+    b, f = [0, 1, 0.5], [1, -1.5, 0.7]
+    y, _ = lfilter(b, f, u, zi=lfiltic(b, f, 5 * random.standard_normal(2)))
+    pd.DataFrame({"u": u, "y": y + e}).to_parquet(path)
+
+
+def one_search(folder: Path, rows: int) -> None:
+    """One model of 50 experiments: read and fitted in one process on one thread, and on workers."""
+    paths = [str(folder / f"{number:03d}-{rows}.parquet") for number in range(50)]
+    for number, path in enumerate(paths):
+        make_experiment(path, number, rows)
+    orders = {"nb": 2, "nf": 2}
+
+    def alone() -> Any:
+        before = th._thetahat.threads(1)
+        try:
+            return th.oe(th.Log.join([th.read_csv(path) for path in paths]), **orders)
+        finally:
+            th._thetahat.threads(before)
+
+    begun = time.perf_counter()
+    whole = alone()
+    single = time.perf_counter() - begun
+    per_task = 25 if rows < 10_000 else None
+    search = lambda: thetahat.dask.fit_experiments(paths, th.oe, per_task=per_task, **orders)  # noqa: E731
+    one, _, _ = on_workers(1, search)
+    two, model, most = on_workers(2, search)
+    error = float(np.max(np.abs(model.parameters / whole.parameters - 1)))
+    print(f"OE(2, 2) of 50 experiments of {rows} rows: one process and thread {single:.2f} s, one worker {one:.2f} s, two {two:.2f} s")
+    print(f"  two workers take {two / single:.2f} of the time of one process; a parameter differs by {error:.1e}, a worker {most:.0f} MB at most")
+
+
 if __name__ == "__main__":
-    logs, pieces = (int(word) for word in [*sys.argv[1:], "10000", "100"][:2])
+    logs, pieces, rows = (int(word) for word in [*sys.argv[1:], *["10000", "100", "400000"][len(sys.argv) - 1 :]])
     os.environ["OMP_NUM_THREADS"] = "1"
     with tempfile.TemporaryDirectory() as name:
-        many(Path(name), logs)
-        one_model(Path(name), pieces)
+        if logs:
+            many(Path(name), logs)
+        if pieces:
+            one_model(Path(name), pieces)
+        for count in (1000, rows):
+            one_search(Path(name), count)

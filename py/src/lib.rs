@@ -1,13 +1,14 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model`, `normal_equations`, `evaluation` and `design` are the batch half, `online` the steppers, `filter` and `track` the steppers behind
-//! logs. `array` reads and makes NumPy arrays, `error` is
+//! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half, `online` the steppers,
+//! `filter` and `track` the steppers behind logs. `array` reads and makes NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
 mod design;
 mod error;
 mod evaluation;
+mod experiments;
 mod filter;
 mod grey_box;
 mod log;
@@ -34,11 +35,16 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<log::Log>()?;
     module.add_class::<grey_box::GreyBox>()?;
     module.add_class::<model::Model>()?;
+    module.add_class::<experiments::Experiments>()?;
     module.add_class::<normal_equations::NormalEquations>()?;
     module.add_class::<evaluation::Validation>()?;
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;
     module.add_class::<track::Tracker>()?;
+    module.add_function(wrap_pyfunction!(experiments::answer, module)?)?;
+    module.add_function(wrap_pyfunction!(experiments::answer_equations, module)?)?;
+    module.add_function(wrap_pyfunction!(experiments::fit_equations_distributed, module)?)?;
+    module.add_function(wrap_pyfunction!(experiments::deviations, module)?)?;
     module.add_function(wrap_pyfunction!(track::policy, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;

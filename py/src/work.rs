@@ -61,7 +61,22 @@ pub(crate) fn awaited<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(Monitor<'_>) -> T + Send + 'static,
 ) -> PyResult<T> {
-    let pool = pool()?;
+    awaited_on(&*pool()?, py, work)
+}
+
+/// The same on threads of its own: work that waits for calls of Python, which may want the others.
+pub(crate) fn interruptible_apart<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(Monitor<'_>) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    awaited_on(&new_pool()?, py, work)?.map_err(|failure| error::batch(py, failure))
+}
+
+fn awaited_on<T: Send + 'static>(
+    pool: &ThreadPool,
+    py: Python<'_>,
+    work: impl FnOnce(Monitor<'_>) -> T + Send + 'static,
+) -> PyResult<T> {
     let asked = Arc::new(AtomicBool::new(false));
     let (sender, receiver) = sync_channel::<Result<T, Box<dyn Any + Send>>>(1);
     let stop = Arc::clone(&asked);
@@ -105,10 +120,14 @@ fn pool() -> PyResult<Arc<ThreadPool>> {
     if let Some(pool) = known.pools.get(&threads) {
         return Ok(Arc::clone(pool));
     }
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = Arc::new(pool.map_err(|error| PyRuntimeError::new_err(format!("no threads: {error}")))?);
+    let pool = Arc::new(new_pool()?);
     known.pools.insert(threads, Arc::clone(&pool));
     Ok(pool)
+}
+
+fn new_pool() -> PyResult<ThreadPool> {
+    let pool = ThreadPoolBuilder::new().num_threads(THREADS.get()).build();
+    pool.map_err(|error| PyRuntimeError::new_err(format!("no threads: {error}")))
 }
 
 /// The pools of this process.

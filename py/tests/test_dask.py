@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ import distributed
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.signal import lfilter, lfiltic
 
 import thetahat as th
 import thetahat.dask
@@ -175,3 +177,89 @@ def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
     assert refusal({"first": one, "other": two.rename(columns={"u": "v"})}).startswith("other: ")
     with pytest.raises(ValueError, match="na"):
         thetahat.dask.normal_equations([MOTOR]).compute()
+
+
+def experiment(seed: int, rows: int = 50_000) -> th.Log:
+    """OE(2, 2, 1) from a state of its own, with white noise."""
+    random = np.random.default_rng(seed)
+    u, e = random.standard_normal(rows) + 2.0, random.standard_normal(rows)
+    b, f = [0.0, 1.0, 0.5], [1.0, -1.5, 0.7]
+    y, _ = lfilter(b, f, u, zi=lfiltic(b, f, 5.0 * random.standard_normal(2)))
+    return th.Log(y + 3.0 + e, u, sample_time=0.1)
+
+
+def test_a_search_over_experiments(client: Any) -> None:
+    logs = {f"log {seed}": experiment(seed) for seed in range(6)}
+    whole = th.oe(th.Log.join(list(logs.values())), nb=2, nf=2)
+    model = thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2)
+    assert np.allclose(model.parameters, whole.parameters, rtol=1e-8, atol=0)
+    assert np.allclose(model.standard_errors, whole.standard_errors, rtol=1e-4, atol=0)
+    assert model.document["data"]["rows"] == 300_000
+    assert model.to_json() == thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json()
+    # Whoever has them.
+    with dask.config.set(scheduler="synchronous"):
+        assert thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json() == model.to_json()
+    short = {name: log[:300] for name, log in logs.items()}
+    for fit, orders in [(th.armax, {"na": 2, "nb": 2, "nc": 2}), (th.arx, {"na": 2, "nb": 2})]:
+        expected = fit(th.Log.join(list(short.values())), **orders)
+        found = thetahat.dask.fit_experiments(short, fit, **orders)
+        assert np.allclose(found.parameters, expected.parameters, rtol=1e-8, atol=0)
+
+
+TANK: dict[str, Any] = {
+    "sample_time": 1,
+    "states": {"level": {"start": 0, "sd": 1}},
+    "inputs": {"flow": "u"},
+    "parameters": {"area": {"start": 1, "sd": 1, "unknown": True, "min": 0}, "leak": {"start": 0.3, "sd": 0.2, "unknown": True}},
+    "next": {"level": "level + dt * (flow - leak * level) / area"},
+    "outputs": {"y": "level"},
+    "noise": {"measurement": {"y": 0.01}},
+}
+
+
+def test_a_search_for_a_model_in_equations(client: Any) -> None:
+    random = np.random.default_rng(1)
+    logs = []
+    for number in range(5):
+        u, level, y = np.repeat(random.uniform(0, 2, 10), 10), 0.0, []
+        for flow in u:
+            y.append(level + 0.1 * random.standard_normal())
+            level += (flow - 0.1 * level) / 2
+        logs.append(th.Log(y, u, sample_time=1))
+    model = thetahat.dask.fit_experiments(logs, th.grey, model=TANK)
+    whole = th.grey(th.Log.join(logs), TANK)
+    assert np.allclose(model.parameters, whole.parameters, rtol=1e-8, atol=0)
+    assert model.document["fit"] and model.document["data"]["digests"] == whole.document["data"]["digests"]
+    with pytest.raises(ValueError, match="rows"):
+        thetahat.dask.fit_experiments(logs, th.grey, model=TANK, estimate="1..50")
+
+
+def test_a_lost_worker_costs_time_and_no_digit(client: Any) -> None:
+    logs = [experiment(seed) for seed in range(6)]
+    expected = thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json()
+    workers = list(client.run(os.getpid).values())
+    killer = threading.Timer(0.3, os.kill, (workers[0], 9))
+    killer.start()
+    assert thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json() == expected
+    killer.join()
+
+
+def test_experiments_that_cannot_be_meant_are_refused(client: Any) -> None:
+    def refusal(logs: Any, fit: Any = th.oe, **options: Any) -> str:
+        with pytest.raises(ValueError) as caught:
+            thetahat.dask.fit_experiments(logs, fit, **{"nb": 2, "nf": 2, **options})
+        return str(caught.value)
+
+    good = MOTOR[:400]
+    gone = th.Log(np.full(100, np.nan), np.arange(100.0), sample_time=0.01)
+    assert refusal({"good": good, "gone": gone}).startswith("gone: no row has a value")
+    assert "sample time" in refusal({"good": good, "slow": th.Log(good["y"], good["u"], sample_time=0.02)})
+    assert "given twice" in refusal([good, good])
+    assert "all rows serve" in refusal([good], estimate="1..100")
+    assert "fits no one model" in refusal([good], th.search)
+    with pytest.raises(FileNotFoundError, match="nowhere.csv"):
+        thetahat.dask.fit_experiments(["nowhere.csv"], th.oe, nb=2, nf=2)
+    with pytest.raises(th.EstimationError, match="input 'u' is constant"):
+        thetahat.dask.fit_experiments([th.Log(good["y"], np.full(400, 2.0), sample_time=0.01)], th.oe, nb=2, nf=2)
+    with pytest.raises(TypeError, match="nc"):
+        thetahat.dask.fit_experiments([good], th.oe, nb=2, nf=2, nc=1)

@@ -36,8 +36,10 @@ mod border;
 mod common;
 mod criteria;
 mod criterion;
+mod distributed;
 pub(crate) mod equations;
 mod exact;
+mod experiments;
 mod impulse_response;
 mod initial;
 mod instrumental;
@@ -76,6 +78,8 @@ pub(crate) use arx::{enough, estimate_is_for_f, lagged_products, out_of_range, t
 pub(crate) use common::{Common, Point, Window};
 pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};
+pub use distributed::{Answer, Ask, Question};
+pub(crate) use distributed::{Distributed, DistributedLikelihood, Holders};
 pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};
@@ -95,7 +99,7 @@ pub(crate) use process::{
 pub use refinement::{Refine, RefinementOutcome};
 pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
-pub(crate) use stretches::stretches;
+pub(crate) use stretches::{seen_by_starts, stretches};
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{Ordered, products_of_innovations, with_levels};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};

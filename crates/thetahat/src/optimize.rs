@@ -59,5 +59,5 @@ pub(crate) use outcome::{Deadline, Found};
 pub use outcome::{Monitor, Progress, Stopped};
 pub(crate) use quasi_newton::least;
 pub(crate) use search::search;
-pub(crate) use solved::{best_free, best_linear};
+pub(crate) use solved::{best_free, best_linear, predicted_decrease};
 pub(crate) use starts::{lowest, normal_number};

@@ -5,6 +5,8 @@
 //!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
 //!   response, [`fit_state_space`] ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
 //! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than memory.
+//! - [`Experiments`] are what others hold, in other processes or on other machines, as a search for one model of all sees them; a model in
+//!   equations is found by [`fit_equations_distributed`], whose questions get an [`answer_equations`].
 //! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
 //! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
 //!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
@@ -37,6 +39,7 @@ mod apply;
 mod convert;
 mod equations;
 mod evaluate;
+mod experiments;
 mod fitted_rows;
 mod held_out_runs;
 #[cfg(feature = "html")]
@@ -61,7 +64,8 @@ mod validation;
 mod warnings;
 
 pub use apply::{Applied, AppliedOutput, apply};
-pub use equations::{EquationsPlan, fit_equations};
+pub use equations::{EquationsPlan, answer_equations, fit_equations, fit_equations_distributed};
+pub use experiments::Experiments;
 pub use held_out_runs::held_out_runs;
 #[cfg(feature = "html")]
 pub use html::{

@@ -620,10 +620,18 @@ def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
     """A fit by one of the functions above, with its arguments: the log, orders and options."""
     log = arguments["log"]
     data = handle("log", log)
+    return told(Model._of(_thetahat.fit(data, [*words(model, arguments, len(log)), *more])), stacklevel=4)
+
+
+def words(model: str | None, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
+    """Orders and options of one of the functions above as those of the command line."""
     orders = {name: arguments[name] for name in ("na", "nb", "nc", "nd", "nf", "nk") if name in arguments}
-    words = [] if model is None else [f"--model={_options.text('model', model)}"]
-    words += [*_options.order_words(**orders), *_options.words(FitOptions, arguments, len(log)), *more]
-    fitted = Model._of(_thetahat.fit(data, words))
+    named = [] if model is None else [f"--model={_options.text('model', model)}"]
+    return [*named, *_options.order_words(**orders), *_options.words(FitOptions, arguments, rows)]
+
+
+def told(fitted: Model, stacklevel: int) -> Model:
+    """A model of whose warnings the caller is told."""
     for warning in fitted._model.warnings():
-        _said.warn(warning, EstimationWarning, stacklevel=3)
+        _said.warn(warning, EstimationWarning, stacklevel=stacklevel)
     return fitted

@@ -18,6 +18,8 @@ the same rows, whatever the workers.
 
 from __future__ import annotations
 
+import contextvars
+import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,12 +33,15 @@ import numpy
 import pandas
 from dask.delayed import Delayed
 
-from thetahat import _many, _said, _thetahat
-from thetahat._fit import search
+from thetahat import _many, _options, _said, _thetahat
+from thetahat._fit import ar, arma, armax, arx, bj, fir, general, oe, search, told, words
+from thetahat._grey_box import GreyBox, grey
 from thetahat._log import Log
+from thetahat._model import Model
 from thetahat._normal_equations import NormalEquations as _NormalEquations
+from thetahat._options import EquationsOptions
 
-__all__ = ["fit_many", "normal_equations", "rows"]
+__all__ = ["fit_experiments", "fit_many", "normal_equations", "rows"]
 
 Logs = Union[str, Iterable[Any], Mapping[str, Any], "dask.bag.Bag", "dask.dataframe.DataFrame"]
 
@@ -180,6 +185,126 @@ def normal_equations(
     True
     """
     work = _many.Work(read=dict(read or {}))
+    lags = 0 if experiments else _lags(**orders)
+    # A task has some pieces that follow one another, one after the other in memory. The last one is read again for its end.
+    runs = _runs(_pieces(logs))
+    pasts: list[Any] = [None]
+    for run in runs[:-1]:
+        pasts.append(dask.delayed(_past)(pasts[-1], dask.delayed(_end)(work, run, lags), lags) if lags else None)
+    sums = [dask.delayed(_sums)(work, run, past, lags, orders) for run, past in zip(runs, pasts)]
+    while len(sums) > 1:
+        sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
+    return sums[0]
+
+
+def fit_experiments(
+    logs: Logs,
+    fit: Callable[..., Model] = oe,
+    *,
+    read: Mapping[str, Any] | None = None,
+    per_task: int | None = None,
+    **options: Any,
+) -> Model:
+    """Fit one model to experiments that the workers of Dask have: the one that ``fit(Log.join(logs), **options)`` finds.
+
+    Each iteration of the search asks all workers at once for the sums over their experiments: the cost, its gradient and its Gram
+    matrix. Experiments stay in the workers' memory, which has to hold them all once; some kilobytes go over the network in an
+    iteration. Starts are found in some rows here; logs of fewer than 262,144 rows together are fetched.
+
+    Parameters
+    ----------
+    logs : iterable, dict of names to logs, str or DataFrame
+        The experiments, as for `fit_many`: files, logs, frames, delayed objects; or a data frame of Dask, whose partitions they are. Nothing
+        reaches from one into the next.
+    fit : {oe, armax, bj, arma, general, grey, arx, ar, fir}, default oe
+        The function of this package that fits the model to one log. What is linear in its parameters is solved in one pass, by
+        `normal_equations`. Logs of a model in equations (`grey`) are fetched too: it is the steps of its filter that take long.
+    read : dict, optional
+        How experiments are read, as for `thetahat.fit_many`.
+    per_task : int, optional
+        How many experiments a task has: unless said otherwise as many as give some 16 tasks, and 32 at most. More for short ones.
+    **options
+        The arguments of ``fit``. All rows serve for the fit, and what is taken from the channels is the mean over all, or nothing.
+
+    Returns
+    -------
+    Model
+        Its report has the fit one step ahead; further figures are those of ``model.validate(log)``. That of a model in equations has all.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for ``fit``; if an experiment cannot be read, has other columns or another sample time, or is given twice.
+
+    Notes
+    -----
+    An iteration takes O(N p) operations on a worker for its N rows, and one message to each task of at most 32 experiments.
+    Parameters are those of one process to 1e-8 of their size, whatever the workers.
+
+    Examples
+    --------
+    >>> import dask
+    >>> import thetahat as th
+    >>> import thetahat.dask
+    >>> motor = th.dc_motor()
+    >>> with dask.config.set(scheduler="threads"):
+    ...     model = thetahat.dask.fit_experiments([motor[:500], motor[500:]], th.oe, nb=2, nf=2)
+    >>> whole = th.oe(th.Log.join([motor[:500], motor[500:]]), nb=2, nf=2)
+    >>> bool(abs(model.parameters - whole.parameters).max() < 1e-8)
+    True
+    """
+    if fit not in (oe, armax, bj, arma, general, grey, arx, ar, fir):
+        name = getattr(fit, "__name__", fit)
+        raise ValueError(f"fit: {name!r} fits no one model to experiments; give thetahat.oe, armax, bj, arma, general or grey")
+    bound = inspect.signature(fit).bind(None, **options)
+    bound.apply_defaults()
+    if fit in (arx, ar, fir):
+        return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve(), stacklevel=3)
+    work = _many.Work(read=dict(read or {}))
+    runs = _runs(_pieces(logs), per_task)
+    if fit is grey:
+        return told(_equations(work, runs, bound.arguments), stacklevel=3)
+    own = words(fit.__name__, bound.arguments)
+    described = dask.persist(*[dask.delayed(_experiments)(work, run, own) for run in runs])
+    texts = dask.compute(*[part[1] for part in described])
+    first, *others = [_thetahat.Experiments.from_json(text) for text in texts]
+    every = first.merged(others)
+    offsets = every.offsets(own)
+    if every.are_fetched:
+        near = [_deviations(part, own, offsets) for part in dask.compute(*described)]
+        found = every.fit(own, lambda questions: [_answer(log, own, question) for log, question in zip(near, questions)])
+    else:
+        held = dask.persist(*[dask.delayed(_deviations)(part, own, offsets) for part in described])
+        del described
+        found = every.fit(own, _asking(_answer, held, own))
+    return told(Model._of(found), stacklevel=3)
+
+
+def _asking(answer: Callable[..., bytes], held: Sequence[Any], *arguments: Any) -> Callable[[list[bytes]], list[bytes]]:
+    """Asks all who hold experiments at once."""
+    # From another thread.
+    context = contextvars.copy_context()
+
+    def ask(questions: list[bytes]) -> list[bytes]:
+        tasks = [dask.delayed(answer, pure=False)(part, *arguments, question) for part, question in zip(held, questions)]
+        return list(context.run(dask.compute, *tasks))
+
+    return ask
+
+
+def _equations(work: _many.Work, runs: Sequence[Sequence[tuple[str, Any]]], arguments: Mapping[str, Any]) -> Model:
+    """A model in equations, of which the workers compute the likelihood."""
+    box = arguments["model"] if isinstance(arguments["model"], GreyBox) else GreyBox(arguments["model"])
+    held = dask.persist(*[dask.delayed(_joined)(work, run) for run in runs])
+    logs = dask.compute(*held)
+    counts = [len(log.experiments) for log in logs]
+    own = _options.words(EquationsOptions, arguments)
+    log = Log.join(logs)._log
+    return Model._of(_thetahat.fit_equations_distributed(log, box._model, own, counts, _asking(_answer_equations, held, box)))
+
+
+def _pieces(logs: Logs) -> list[tuple[str, Any]]:
+    """The logs with their names, each of them once."""
     if isinstance(logs, dask.dataframe.DataFrame):
         named = [(f"partition {place}", part) for place, part in enumerate(logs.to_delayed())]
     else:
@@ -190,18 +315,58 @@ def normal_equations(
         if own in known:
             raise ValueError(f"logs: {known[own]} is given twice, the second time as {name}; give each piece once")
         known[own] = name
-    lags = 0 if experiments else _lags(**orders)
-    # A task has some pieces that follow one another, one after the other in memory. The last one is read again for its end.
-    # How many does not depend on the workers: the same pieces give the same bytes.
-    count = max(1, min(_MOST, len(named) // _TASKS))
-    runs = [named[first : first + count] for first in range(0, len(named), count)]
-    pasts: list[Any] = [None]
-    for run in runs[:-1]:
-        pasts.append(dask.delayed(_past)(pasts[-1], dask.delayed(_end)(work, run, lags), lags) if lags else None)
-    sums = [dask.delayed(_sums)(work, run, past, lags, orders) for run, past in zip(runs, pasts)]
-    while len(sums) > 1:
-        sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
-    return sums[0]
+    return named
+
+
+def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None) -> list[Sequence[tuple[str, Any]]]:
+    """What each task has. How much does not depend on the workers: the same pieces give the same bytes."""
+    count = _count(per_task, max(1, min(_MOST, len(named) // _TASKS)))
+    return [named[first : first + count] for first in range(0, len(named), count)]
+
+
+def _experiments(work: _many.Work, run: Sequence[tuple[str, Any]], own: Sequence[str]) -> tuple[Log, str]:
+    """Some experiments as one log, and what is known of them."""
+    logs, described = [], []
+    with _shared():
+        for name, item in run:
+            log = _loaded(work, name, item)
+            with _in_piece(name):
+                described.append(_thetahat.Experiments(log._log, own))
+            logs.append(log)
+        every = described[0].merged(described[1:]).joined()
+        return Log.join(logs), every.to_json()
+
+
+def _joined(work: _many.Work, run: Sequence[tuple[str, Any]]) -> Log:
+    """Some experiments as one log."""
+    with _shared():
+        return Log.join([_loaded(work, name, item) for name, item in run])
+
+
+def _answer_equations(log: Log, box: GreyBox, question: bytes) -> bytes:
+    with _shared():
+        return _thetahat.answer_equations(log._log, box._model, question)
+
+
+def _deviations(part: tuple[Log, str], own: Sequence[str], offsets: Sequence[float]) -> Log:
+    log, _ = part
+    with _shared():
+        return Log._of(_thetahat.deviations(log._log, own, offsets), log._clock)
+
+
+def _answer(log: Log, own: Sequence[str], question: bytes) -> bytes:
+    with _shared():
+        return _thetahat.answer(log._log, own, question)
+
+
+@contextmanager
+def _shared() -> Iterator[None]:
+    """What is done here shares the threads of the worker."""
+    before = _thetahat.threads(_threads())
+    try:
+        yield
+    finally:
+        _thetahat.threads(before)
 
 
 def _lags(
@@ -258,9 +423,8 @@ def _sums(
     orders: Mapping[str, Any],
 ) -> _NormalEquations:
     """The sums of some pieces that follow one another."""
-    before = _thetahat.threads(_threads())
     sums: _NormalEquations | None = None
-    try:
+    with _shared():
         for name, item in run:
             log = _loaded(work, name, item)
             with _in_piece(name):
@@ -271,8 +435,6 @@ def _sums(
             if lags:
                 past = _past(past, _columns(log, slice(-lags, None)), lags)
             sums = piece if sums is None else sums.merge(piece)
-    finally:
-        _thetahat.threads(before)
     if sums is None:
         raise ValueError("logs: there is none; give at least one piece")
     return sums
@@ -318,11 +480,17 @@ def _tasks(
     named = _many.name_all(logs)
     files = _many.reports_of([name for name, _ in named], named, reports)
     triples = [(name, item, file) for (name, item), file in zip(named, files)]
-    count = max(1, min(_MOST, len(triples) // (_TASKS * _workers()))) if per_task is None else per_task
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ValueError(f"per_task={per_task!r}: give a number from 1 on")
+    count = _count(per_task, max(1, min(_MOST, len(triples) // (_TASKS * _workers()))))
     tasks = [triples[first : first + count] for first in range(0, len(triples), count)]
     return [dask.delayed(_each)(work, task, None) for task in tasks]
+
+
+def _count(per_task: int | None, default: int) -> int:
+    """How many logs a task has."""
+    count = default if per_task is None else per_task
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ValueError(f"per_task={per_task!r}: give a number from 1 on")
+    return count
 
 
 def _workers() -> int:
@@ -337,13 +505,10 @@ def _workers() -> int:
 
 def _each(work: _many.Work, task: Iterable[tuple[str, Any, str | None]], folder: str | None) -> list[dict[str, Any]]:
     """The rows of some logs."""
-    before = _thetahat.threads(_threads())
-    try:
+    with _shared():
         if folder is not None:
             task = [(name, item, _many.report_of(folder, PurePosixPath(name))) for name, item, _ in task]
         return [work(name, item, file)[0] for name, item, file in task]
-    finally:
-        _thetahat.threads(before)
 
 
 def _threads() -> int:

@@ -22,7 +22,7 @@ use crate::respond::{
     NisSummary,
     equations::{Experiment, Failure},
 };
-pub(crate) use likelihood::LikelihoodObjective;
+pub(crate) use likelihood::{Likelihood, LikelihoodObjective, Slopes};
 use objective::Deviance;
 pub(crate) use uncertainty::listed;
 
@@ -125,26 +125,65 @@ pub(crate) fn largest_likelihood(
     options: &Search,
     monitor: Monitor<'_>,
 ) -> Result<EquationsEstimate, Error> {
+    let criterion = || LikelihoodObjective::new(model, experiments);
+    let starts = checked_starts(model, &criterion(), options)?;
+    let deadline = Deadline::after(options.time_limit);
+    let searched = starts.into_par_iter().map(|start| {
+        let mut deviance = Deviance::new(model, criterion());
+        // No likelihood is so large that it cannot be larger.
+        search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
+    });
+    estimate_of(model, experiments, options, searched.collect(), &mut criterion())
+}
+
+/// The same with a likelihood that others compute, from one start after the other.
+pub(crate) fn largest_likelihood_of(
+    criterion: impl Likelihood,
+    model: &GreyBox,
+    experiments: &[Experiment],
+    options: &Search,
+    monitor: Monitor<'_>,
+) -> Result<EquationsEstimate, Error> {
+    let starts = checked_starts(model, &criterion, options)?;
+    let deadline = Deadline::after(options.time_limit);
+    let mut deviance = Deviance::new(model, criterion);
+    let searched = starts
+        .iter()
+        .map(|start| search(&mut deviance, start, options, f64::NEG_INFINITY, deadline, monitor));
+    let searched = searched.collect();
+    estimate_of(model, experiments, options, searched, &mut deviance.criterion)
+}
+
+/// The starts of a search that may begin.
+fn checked_starts(
+    model: &GreyBox,
+    criterion: &impl Likelihood,
+    options: &Search,
+) -> Result<Vec<Vec<f64>>, Error> {
     options.check_numbers()?;
     let unknown = model.parameters();
-    let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
-    let samples = LikelihoodObjective::new(model, experiments).measurements;
-    if samples <= names.len() {
-        let message = format!(
-            "{} unknown parameters need more than {samples} measured values; give a longer log",
-            names.len()
-        );
-        return Err(Error::undetermined(names, message));
+    let samples = criterion.measurements();
+    if samples > unknown.len() {
+        return Ok(starts(unknown, options));
     }
-    let deadline = Deadline::after(options.time_limit);
-    let searched: Vec<Result<Result<Found, Failure>, Error>> = starts(unknown, options)
-        .into_par_iter()
-        .map(|start| {
-            let mut deviance = Deviance::new(model, experiments);
-            // No likelihood is so large that it cannot be larger.
-            search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
-        })
-        .collect();
+    let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
+    let message = format!(
+        "{} unknown parameters need more than {samples} measured values; give a longer log",
+        names.len()
+    );
+    Err(Error::undetermined(names, message))
+}
+
+/// The estimate of the best search.
+fn estimate_of(
+    model: &GreyBox,
+    experiments: &[Experiment],
+    options: &Search,
+    searched: Vec<Result<Result<Found, Failure>, Error>>,
+    criterion: &mut impl Likelihood,
+) -> Result<EquationsEstimate, Error> {
+    let unknown = model.parameters();
+    let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
     let searched: Vec<Result<Found, Failure>> = searched.into_iter().collect::<Result<_, Error>>()?;
     let log_likelihood = |cost: f64| -cost / 2.0;
     let reached: Vec<Option<f64>> =
@@ -155,18 +194,17 @@ pub(crate) fn largest_likelihood(
         searched.into_iter().nth(best).ok_or_else(|| Error::data("there is no start to search from"))?;
     let found = best.map_err(|failure| failure.error(experiments))?;
 
-    let mut criterion = LikelihoodObjective::new(model, experiments);
     criterion.linearize(&found.parameters).map_err(|failure| failure.error(experiments))?;
     let slopes: Vec<f64> =
         unknown.iter().zip(&found.parameters).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
-    let (covariance, condition) = uncertainty::covariance(&criterion.information, &slopes, &names)?;
+    let (covariance, condition) = uncertainty::covariance(&criterion.slopes().information, &slopes, &names)?;
     uncertainty::check(unknown, &found.parameters, &covariance)?;
     Ok(EquationsEstimate {
         values: unknown.iter().zip(&found.parameters).map(|(unknown, &z)| unknown.inside(z)).collect(),
         covariance,
         condition,
         value: found.cost() / 2.0,
-        samples,
+        samples: criterion.measurements(),
         search: LikelihoodSearch {
             algorithm: options.algorithm,
             step: (options.algorithm == Algorithm::Gradient).then_some(options.step),

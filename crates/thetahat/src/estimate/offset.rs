@@ -39,16 +39,14 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::predictor::{InitialCondition, Predictor};
-use super::{
-    ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, estimate_of_channels, exact,
-    prediction_error,
-};
+use super::experiments::Experiments;
+use super::predictor::InitialCondition;
+use super::{ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, exact, prediction_error};
 use crate::Error;
-use crate::data::{Offset, Record};
+use crate::data::Offset;
 use crate::estimate::Criteria;
 use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
-use crate::optimize::best_free;
+use crate::optimize::{Objective, best_free, predicted_decrease};
 pub(crate) use beside::Beside;
 pub(crate) use normal_equations::LinearProblem;
 pub(crate) use worth::pays;
@@ -75,9 +73,8 @@ pub enum Constant {
 }
 
 /// What to estimate, beside the constant.
-#[derive(Clone, Copy)]
-pub(crate) struct Task<'a> {
-    pub(crate) record: &'a Record<'a>,
+pub(crate) struct Task<'a, D> {
+    pub(crate) data: &'a D,
     /// The inputs' names.
     pub(crate) inputs: &'a [String],
     pub(crate) orders: &'a Orders,
@@ -119,7 +116,15 @@ pub(crate) struct OutputOffset {
     pub(crate) middle: f64,
 }
 
-impl Task<'_> {
+impl<D> Clone for Task<'_, D> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<D> Copy for Task<'_, D> {}
+
+impl<D: Experiments> Task<'_, D> {
     /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `start` has the
     /// parameters of a model with both, where a choice among models has found some.
     ///
@@ -238,8 +243,8 @@ impl Task<'_> {
     /// Without a constant.
     fn plain(&self, start: Option<Vec<f64>>) -> Result<Fitted, Error> {
         let method = starting_from(self.method, start);
-        let Self { record, inputs, orders, initial, monitor, .. } = *self;
-        let estimate = estimate_of_channels(record, inputs, orders, &method, initial, monitor)?;
+        let Self { data, inputs, orders, initial, monitor, .. } = *self;
+        let estimate = data.estimate(inputs, orders, &method, initial, monitor)?;
         Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None, open: None })
     }
 
@@ -258,9 +263,9 @@ impl Task<'_> {
             variance.map(|variance| all.parameters()[place].powi(2) / variance / (all.samples() as f64).ln());
         let white_samples = (self.orders.structure() == Structure::Oe).then(|| {
             let signals = beside.signals();
-            let (record, orders) =
-                (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
-            white_samples(&record, &orders, &all).unwrap_or(0.0)
+            let (data, orders) =
+                (self.data.with_inputs(&signals), self.orders.with_constants(beside.count()));
+            white_samples(&data, &orders, &all).unwrap_or(0.0)
         });
         Ok(beside.apart(self.orders, all).map(|fitted| WithConstant { fitted, worth, white_samples }))
     }
@@ -268,7 +273,7 @@ impl Task<'_> {
     /// The estimate of all parameters, the constant and the trend among them.
     fn all(&self, beside: &Beside, start: Option<Vec<f64>>) -> Result<Estimate, Error> {
         let signals = beside.signals();
-        let record = self.record.with_inputs(&signals);
+        let data = self.data.with_inputs(&signals);
         let orders = self.orders.with_constants(beside.count());
         // Initial parameters of the model alone are some of it with zeros.
         let own = match self.method {
@@ -286,7 +291,7 @@ impl Task<'_> {
             Initial::Auto if self.orders.na > 0 && orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
             initial => initial,
         };
-        estimate_of_channels(&record, self.inputs, &orders, &method, initial, self.monitor)
+        data.estimate(self.inputs, &orders, &method, initial, self.monitor)
     }
 
     /// What an estimate without a constant leaves open of an offset that was taken off before, as a mean or a line: the covariance
@@ -311,7 +316,9 @@ impl Task<'_> {
         }
         let found = match without.procedure() {
             Procedure::LeastSquares { .. } | Procedure::Constrained(_) if !beside.has_trend() => {
-                OfConstant::new(self.record, self.orders, without).map(|of| of.joint(without))
+                let record = self.data.record();
+                let of = record.and_then(|record| OfConstant::new(record, self.orders, without));
+                of.map(|of| of.joint(without))
             }
             Procedure::InstrumentalVariables { .. } | Procedure::Regularised(_) | Procedure::Robust(_) => {
                 match self.all(beside, None) {
@@ -326,13 +333,14 @@ impl Task<'_> {
             }
             procedure => {
                 let signals = beside.signals();
-                let (record, orders) =
-                    (self.record.with_inputs(&signals), self.orders.with_constants(beside.count()));
+                let (data, orders) =
+                    (self.data.with_inputs(&signals), self.orders.with_constants(beside.count()));
                 let parameters = beside.with_zeros(self.orders, without.parameters());
-                if matches!(procedure, Procedure::ExactLikelihood(_)) {
-                    exact::beside(&record, beside.count(), &orders, without, &parameters)
-                } else {
-                    prediction_error::beside(&record, &orders, without, &parameters)
+                match (procedure, data.record()) {
+                    (Procedure::ExactLikelihood(_), Some(record)) => {
+                        exact::beside(record, beside.count(), &orders, without, &parameters)
+                    }
+                    _ => prediction_error::beside(&data, &orders, without, &parameters),
                 }
             }
         };
@@ -344,32 +352,32 @@ impl Task<'_> {
         if without.mse() == 0.0 {
             return false;
         }
-        if self.orders.is_linear() {
+        if let (true, Some(record)) = (self.orders.is_linear(), self.data.record()) {
             // Of another norm least squares says it: a constant takes the mean off the errors in either.
             let squares = match self.method {
                 Method::Constrained(_) => {
-                    let Ok(squares) = arx(self.record, self.orders, self.initial) else { return false };
+                    let Ok(squares) = arx(record, self.orders, self.initial) else { return false };
                     squares
                 }
                 _ => without.clone(),
             };
-            return lowers_mdl(self.record, self.orders, &squares);
+            return lowers_mdl(record, self.orders, &squares);
         }
         let samples = without.samples() as f64;
         let signals = beside.signals();
-        let record = self.record.with_inputs(&signals);
+        let data = self.data.with_inputs(&signals);
         let orders = self.orders.with_constants(beside.count());
         let parameters = beside.with_zeros(self.orders, without.parameters());
         let known = conditions(without) as f64;
         let from = |begin| {
-            let mut predictor = Predictor::new(&record, &orders, begin);
+            let mut predictor = data.errors(&orders, begin);
             if begin == InitialCondition::Unknown && known > predictor.initial_conditions() as f64 {
-                predictor = Predictor::new(&record, &orders, InitialCondition::UnknownInputs);
+                predictor = data.errors(&orders, InitialCondition::UnknownInputs);
             }
             let price = (1.0 + predictor.initial_conditions() as f64 - known) * samples.ln();
             let count = predictor.samples() as f64;
             let Ok(cost) = best_free(&mut predictor, &parameters) else { return false };
-            let left = (cost - predictor.predicted_decrease()).max(0.0);
+            let left = (cost - predicted_decrease(&mut predictor)).max(0.0);
             samples * (without.mse() * count / left).ln() > PROMISING * price
         };
         let rests = without.initial() == Initial::Zero;

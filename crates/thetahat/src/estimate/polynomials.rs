@@ -4,7 +4,7 @@ use crate::model::{Orders, polynomial::is_stable};
 
 /// Why parameters have no cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Unusable {
+pub(crate) enum Unusable {
     /// C or F has a root outside the unit circle.
     Unstable,
     /// The errors overflow.

@@ -7,17 +7,19 @@ mod ranking;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::arx::{arx, estimate_is_for_f, out_of_range, rows, signals};
+use super::arx::{arx, estimate_is_for_f, out_of_range, rows};
+use super::experiments::{Experiments, PredictionErrors};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Unusable;
 use super::predictor::{InitialCondition, Predictor};
-use super::stretches::{energy, thinned};
-use super::uncertainty::{autoregression, backward_filtered_products, coloured, restricted};
+use super::uncertainty::{autoregression, backward_filtered_products, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
-use crate::optimize::{Deadline, Found, Monitor, Search, Stopped, best_free, search};
+use crate::optimize::{
+    Deadline, Found, Monitor, Objective, Search, Stopped, best_free, predicted_decrease, search,
+};
 use crate::regression::{Taps, condition};
 use crate::respond::{NOTHING_LEFT, are_worth};
 
@@ -34,10 +36,14 @@ pub(crate) fn drop_is_not_for_f() -> Error {
 }
 
 /// How the initial conditions are treated.
-fn begins(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<(InitialCondition, bool), Error> {
+fn begins(
+    data: &impl Experiments,
+    orders: &Orders,
+    initial: Initial,
+) -> Result<(InitialCondition, bool), Error> {
     let filtered = orders.has_f();
     // In the middle of a log nothing is at rest.
-    let measured = record.past.iter().any(|past| *past > 0);
+    let measured = data.is_measured_before();
     match initial {
         Initial::Drop if filtered => Err(drop_is_not_for_f()),
         Initial::Zero => Ok((InitialCondition::Zero, false)),
@@ -49,31 +55,30 @@ fn begins(record: &Record<'_>, orders: &Orders, initial: Initial) -> Result<(Ini
 
 /// Fits A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t) by a search for the least sum of squared prediction
 /// errors from several starts; an ARX model in one step.
-pub(super) fn prediction_error(
-    record: &Record<'_>,
+pub(super) fn prediction_error<D: Experiments>(
+    data: &D,
     orders: &Orders,
     initial: Initial,
     options: &Search,
     monitor: Monitor<'_>,
 ) -> Result<Estimate, Error> {
-    if orders.is_linear() {
+    if let (true, Some(record)) = (orders.is_linear(), data.record()) {
         return arx(record, orders, initial);
     }
     options.check(&orders.names())?;
-    signals(record, orders)?;
-    let (begin, choose) = begins(record, orders, initial)?;
-    let mut predictor = Predictor::new(record, orders, begin);
+    data.check(orders)?;
+    let (begin, choose) = begins(data, orders, initial)?;
+    let mut predictor = data.errors(orders, begin);
     enough(&predictor, orders)?;
-    let energy = energy(record);
+    let energy = data.energy();
     if !energy.is_normal() && energy != 0.0 {
         return Err(out_of_range());
     }
     let deadline = Deadline::after(options.time_limit);
     let job = Job { options, smallest: NOTHING_LEFT * energy, deadline, monitor };
-    let problem = Problem { record, orders, begin };
-    let mut beginning = job.beginning(problem, &mut predictor)?;
+    let mut beginning = job.beginning(data, orders, begin, &mut predictor)?;
     let mut reached = if choose {
-        job.choose(record, orders, predictor, &mut beginning)?
+        job.choose(data, orders, predictor, &mut beginning)?
     } else {
         let initial = match begin {
             InitialCondition::Zero => Initial::Zero,
@@ -82,12 +87,12 @@ pub(super) fn prediction_error(
             }
             InitialCondition::Unknown | InitialCondition::UnknownInputs => Initial::Drop,
         };
-        let found = job.search_from(problem, &mut predictor, &mut beginning)?;
+        let found = job.search_from(data, orders, begin, &mut predictor, &mut beginning)?;
         let found = found.ok_or_else(|| hopeless(orders))?;
         Reached { predictor, found, initial }
     };
-    if begin != InitialCondition::Zero && Predictor::has_unknown_inputs(record, orders) {
-        reached = job.with_inputs(record, orders, reached, &beginning.parameters)?;
+    if begin != InitialCondition::Zero && data.has_unknown_inputs(orders) {
+        reached = job.with_inputs(data, orders, reached, &beginning.parameters)?;
     }
     let Reached { predictor, found, initial } = reached;
     beginning.reached(found.cost() / predictor.samples() as f64);
@@ -95,13 +100,13 @@ pub(super) fn prediction_error(
 }
 
 /// Where a search has ended. The predictor stands there.
-struct Reached<'r> {
-    predictor: Predictor<'r>,
+struct Reached<E> {
+    predictor: E,
     found: Found,
     initial: Initial,
 }
 
-/// What a search is for: the samples, the orders, and what stands before a segment.
+/// What a search on a record is for: the samples, the orders, and what stands before a segment.
 #[derive(Clone, Copy)]
 struct Problem<'p, 'r> {
     record: &'p Record<'r>,
@@ -128,17 +133,19 @@ impl Job<'_> {
     ///
     /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a few
     /// iterations on all samples are left.
-    fn beginning(
+    fn beginning<D: Experiments>(
         &self,
-        problem: Problem<'_, '_>,
-        predictor: &mut Predictor<'_>,
+        data: &D,
+        orders: &Orders,
+        begin: InitialCondition,
+        predictor: &mut impl PredictionErrors,
     ) -> Result<TrackStart, Error> {
-        if let Some(thin) = thinned(problem.record) {
+        if let Some(thin) = data.thinned() {
             // In the middle of a log nothing is at rest.
-            let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };
+            let problem = Problem { record: &thin, orders, begin: InitialCondition::Unknown };
             let mut small = problem.predictor();
             let near = self.ranked(problem, &mut small).and_then(|mut beginning| {
-                let found = self.search_from(problem, &mut small, &mut beginning)?;
+                let found = self.search_from(&thin, orders, problem.begin, &mut small, &mut beginning)?;
                 Ok(found.map(|found| (found, beginning)))
             });
             match near {
@@ -159,7 +166,8 @@ impl Job<'_> {
                 }
             }
         }
-        self.ranked(problem, predictor)
+        let record = data.record().ok_or_else(|| hopeless(orders))?;
+        self.ranked(Problem { record, orders, begin }, predictor)
     }
 
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
@@ -168,8 +176,10 @@ impl Job<'_> {
     /// compared with what it found.
     fn search_from(
         &self,
-        problem: Problem<'_, '_>,
-        predictor: &mut Predictor<'_>,
+        data: &impl Experiments,
+        orders: &Orders,
+        begin: InitialCondition,
+        predictor: &mut impl PredictionErrors,
         beginning: &mut TrackStart,
     ) -> Result<Option<Found>, Error> {
         let mut found = match &beginning.found {
@@ -181,7 +191,10 @@ impl Job<'_> {
         if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
             beginning.compared = true;
             let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);
-            let nested = self.nested_below(problem, predictor, lowest)?;
+            let nested = match data.record() {
+                Some(record) => self.nested_below(Problem { record, orders, begin }, predictor, lowest)?,
+                None => None,
+            };
             if let Some((outcome, parameters)) = nested
                 && let Ok(better) = self.search(predictor, &parameters)?
             {
@@ -193,7 +206,7 @@ impl Job<'_> {
         }
         if let Some(found) = &mut found {
             let _ = best_free(predictor, &found.parameters);
-            predictor.linearize();
+            let _ = predictor.linearize();
         }
         Ok(found)
     }
@@ -201,15 +214,14 @@ impl Job<'_> {
     /// Estimates the initial conditions where that is worth its parameters: N ln(V_zero/V_estimate) > n ln N.
     ///
     /// One of the two searches is done, where a step of the other predicts that it cannot change the answer.
-    fn choose<'r>(
+    fn choose<'d, D: Experiments>(
         &self,
-        record: &Record<'r>,
+        data: &'d D,
         orders: &Orders,
-        mut estimated: Predictor<'r>,
+        mut estimated: D::Errors<'d>,
         beginning: &mut TrackStart,
-    ) -> Result<Reached<'r>, Error> {
-        let problem = |begin| Problem { record, orders, begin };
-        let mut resting = problem(InitialCondition::Zero).predictor();
+    ) -> Result<Reached<D::Errors<'d>>, Error> {
+        let mut resting = data.errors(orders, InitialCondition::Zero);
         let samples = estimated.samples();
         let rows = resting.samples() as f64;
         let more = estimated.initial_conditions();
@@ -223,23 +235,24 @@ impl Job<'_> {
             beginning.found.is_none() && matches!(costs, (Ok(zero), Ok(free)) if !worth(zero, free));
         let mut at_rest = None;
         if at_rest_first
-            && let Some(found) = self.search_from(problem(InitialCondition::Zero), &mut resting, beginning)?
+            && let Some(found) =
+                self.search_from(data, orders, InitialCondition::Zero, &mut resting, beginning)?
         {
             let predicted = best_free(&mut estimated, &found.parameters)
-                .map_or(f64::INFINITY, |cost| cost - estimated.predicted_decrease());
+                .map_or(f64::INFINITY, |cost| cost - predicted_decrease(&mut estimated));
             if !worth(found.cost(), predicted) {
                 return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
             }
             at_rest = Some(found);
         }
-        let free = self.search_from(problem(InitialCondition::Unknown), &mut estimated, beginning)?;
+        let free = self.search_from(data, orders, InitialCondition::Unknown, &mut estimated, beginning)?;
         let Some(free) = free else {
             let found = at_rest.ok_or_else(|| hopeless(orders))?;
             return Ok(Reached { predictor: resting, found, initial: Initial::Zero });
         };
         if at_rest.is_none() {
             let predicted = best_free(&mut resting, &free.parameters)
-                .map_or(f64::INFINITY, |cost| cost - resting.predicted_decrease());
+                .map_or(f64::INFINITY, |cost| cost - predicted_decrease(&mut resting));
             if !worth(predicted, free.cost()) {
                 at_rest = self.search(&mut resting, &free.parameters)?.ok();
             }
@@ -253,16 +266,16 @@ impl Job<'_> {
     /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial conditions.
     ///
     /// No search is done where a step predicts that it cannot change the answer.
-    fn with_inputs<'r>(
+    fn with_inputs<'d, D: Experiments>(
         &self,
-        record: &Record<'r>,
+        data: &'d D,
         orders: &Orders,
-        reached: Reached<'r>,
+        reached: Reached<D::Errors<'d>>,
         start: &[f64],
-    ) -> Result<Reached<'r>, Error> {
-        let mut wide = Predictor::new(record, orders, InitialCondition::UnknownInputs);
+    ) -> Result<Reached<D::Errors<'d>>, Error> {
+        let mut wide = data.errors(orders, InitialCondition::UnknownInputs);
         let samples = wide.samples();
-        let mean = |cost: f64, predictor: &Predictor<'_>| cost / predictor.samples() as f64;
+        let mean = |cost: f64, predictor: &D::Errors<'d>| cost / predictor.samples() as f64;
         let (given, few) =
             (mean(reached.found.cost(), &reached.predictor), reached.predictor.initial_conditions());
         let unknown = wide.initial_conditions();
@@ -273,7 +286,7 @@ impl Job<'_> {
         };
         let mut best: Option<(f64, &[f64])> = None;
         for parameters in [&reached.found.parameters, start] {
-            let predicted = best_free(&mut wide, parameters).map(|cost| cost - wide.predicted_decrease());
+            let predicted = best_free(&mut wide, parameters).map(|cost| cost - predicted_decrease(&mut wide));
             if let Ok(predicted) = predicted
                 && best.is_none_or(|(least, _)| predicted < least)
             {
@@ -290,7 +303,7 @@ impl Job<'_> {
             return Ok(reached);
         }
         // Not a better place alone.
-        let mut narrow = Predictor::new(record, orders, InitialCondition::Unknown);
+        let mut narrow = data.errors(orders, InitialCondition::Unknown);
         let same_place = best_free(&mut narrow, &found.parameters);
         if let Ok(cost) = same_place
             && !worth(mean(cost, &narrow), with, narrow.initial_conditions())
@@ -301,17 +314,17 @@ impl Job<'_> {
         Ok(Reached { predictor: wide, found, initial: Initial::Estimate })
     }
 
-    fn search(
+    fn search<E: PredictionErrors>(
         &self,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut E,
         parameters: &[f64],
     ) -> Result<Result<Found, Unusable>, Error> {
         self.search_with(predictor, parameters, self.options)
     }
 
-    fn search_with(
+    fn search_with<E: PredictionErrors>(
         &self,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut E,
         parameters: &[f64],
         options: &Search,
     ) -> Result<Result<Found, Unusable>, Error> {
@@ -322,7 +335,7 @@ impl Job<'_> {
     fn finish(
         &self,
         orders: &Orders,
-        predictor: &Predictor<'_>,
+        predictor: &impl PredictionErrors,
         found: Found,
         beginning: TrackStart,
         initial: Initial,
@@ -397,15 +410,18 @@ struct Uncertainty {
 
 /// sigma^2 G^-1, or its form for coloured errors where there is no model of the noise; none where G is singular to
 /// rounding.
-fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) -> Option<Uncertainty> {
+fn uncertainty(
+    predictor: &impl PredictionErrors,
+    orders: &Orders,
+    noise_variance: f64,
+) -> Option<Uncertainty> {
     let (root, condition) = inverse_root(predictor)?;
     let covariance = if orders.structure() == Structure::Oe {
-        let (residuals, segments) = predictor.stretches();
         let taken = orders.parameters() + predictor.initial_conditions();
-        let colour = restricted(&residuals, || predictor.sensitivities(), &segments, taken);
+        let colour = predictor.restricted_autoregression(taken)?;
         // On columns that are orthogonal: where parameters can hardly be told apart, the sums over psi itself would lose them
         // in rounding twice, and variances could come out negative.
-        let products = predictor.backward_filtered_products(&root.transpose(), &colour.monic);
+        let products = predictor.backward_filtered_products(&root.transpose(), &colour.monic)?;
         coloured(&root, colour.variance * colour.inflation(predictor.samples(), taken), &products)
     } else {
         &root * root.transpose() * noise_variance
@@ -416,32 +432,36 @@ fn uncertainty(predictor: &Predictor<'_>, orders: &Orders, noise_variance: f64) 
 /// The covariance of all parameters of a model of which some were not estimated, those of a constant and a trend, if they were,
 /// and the Gauss-Newton step to their estimate. None where they cannot be told from the others.
 pub(super) fn beside(
-    record: &Record<'_>,
+    data: &impl Experiments,
     orders: &Orders,
     estimate: &Estimate,
     parameters: &[f64],
 ) -> Option<(Vec<Vec<f64>>, Vec<f64>)> {
-    let mut predictor = predictor_of(record, orders, estimate);
+    let mut predictor = predictor_of(data, orders, estimate);
     best_free(&mut predictor, parameters).ok()?;
-    predictor.linearize();
+    predictor.linearize().ok()?;
     let known = uncertainty(&predictor, orders, estimate.noise_variance())?;
     let (root, _) = inverse_root(&predictor)?;
-    let step = &root * (root.transpose() * DVector::from_column_slice(&predictor.right));
+    let step = &root * (root.transpose() * DVector::from_column_slice(predictor.right()));
     Some((known.covariance, step.as_slice().to_vec()))
 }
 
-/// The prediction errors of a record with the initial conditions that an estimate from it has.
-pub(super) fn predictor_of<'r>(record: &Record<'r>, orders: &Orders, estimate: &Estimate) -> Predictor<'r> {
+/// The prediction errors of data with the initial conditions that an estimate from them has.
+pub(super) fn predictor_of<'d, D: Experiments>(
+    data: &'d D,
+    orders: &Orders,
+    estimate: &Estimate,
+) -> D::Errors<'d> {
     let begin =
         if estimate.initial() == Initial::Zero { InitialCondition::Zero } else { InitialCondition::Unknown };
-    let predictor = Predictor::new(record, orders, begin);
+    let predictor = data.errors(orders, begin);
     let conditions = match estimate.procedure() {
         Procedure::PredictionError(outcome) => outcome.initial_conditions,
         Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
         _ => 0,
     };
     if conditions > predictor.initial_conditions() {
-        return Predictor::new(record, orders, InitialCondition::UnknownInputs);
+        return data.errors(orders, InitialCondition::UnknownInputs);
     }
     predictor
 }
@@ -479,16 +499,16 @@ pub(super) fn backward_products(segments: &[Vec<Vec<f64>>], monic: &[f64]) -> DM
 }
 
 /// Whether the errors tell the parameters apart, where the predictor stands.
-pub(super) fn is_determined(predictor: &Predictor<'_>) -> bool {
+pub(super) fn is_determined(predictor: &impl PredictionErrors) -> bool {
     inverse_root(predictor).is_some()
 }
 
 /// R^-1 with R'R = G, so that psi R^-1 has orthonormal columns, and the condition number of psi. By Cholesky of the Gram
 /// matrix, or by QR where that is not exact enough: what is left of a column beside free responses that are nearly the same has
 /// lost as many digits as a condition number would take.
-pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f64)> {
-    let size = predictor.right.len();
-    let matrix = DMatrix::from_row_slice(size, size, &predictor.matrix);
+pub(super) fn inverse_root(predictor: &impl PredictionErrors) -> Option<(DMatrix<f64>, f64)> {
+    let size = predictor.right().len();
+    let matrix = DMatrix::from_row_slice(size, size, predictor.matrix());
     let scales = matrix.diagonal().map(f64::sqrt);
     let unit = DMatrix::from_fn(size, size, |i, j| matrix[(i, j)] / scales[i] / scales[j]);
     // What the free responses leave of a column may be nothing but rounding, and its square negative.
@@ -500,7 +520,7 @@ pub(super) fn inverse_root(predictor: &Predictor<'_>) -> Option<(DMatrix<f64>, f
     {
         return Some((inverted(&triangle, &scales)?, condition));
     }
-    root_of(&predictor.factor().ok()?)
+    root_of(&predictor.factor()?)
 }
 
 /// The same from the factor of psi; none where it tells that psi is singular.
@@ -525,7 +545,7 @@ fn inverted(triangle: &DMatrix<f64>, scales: &DVector<f64>) -> Option<DMatrix<f6
 }
 
 /// There must be more samples that count than parameters and initial conditions.
-fn enough(predictor: &Predictor<'_>, orders: &Orders) -> Result<(), Error> {
+fn enough(predictor: &impl PredictionErrors, orders: &Orders) -> Result<(), Error> {
     let unknown = orders.parameters() + predictor.initial_conditions();
     if predictor.samples() > unknown {
         return Ok(());

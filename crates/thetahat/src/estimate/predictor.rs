@@ -44,6 +44,7 @@ mod weighted;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 
@@ -52,7 +53,7 @@ use super::polynomials::{Polynomials, Unusable};
 use super::uncertainty::backward_filtered_products;
 use crate::data::{Record, measured};
 use crate::model::Orders;
-use crate::regression::{Products, Taps, factor_rows};
+use crate::regression::{Products, Taps, factor_rows, sum, sum_of_squares};
 use section::Section;
 
 /// Samples from which threads pay for themselves.
@@ -102,8 +103,8 @@ struct Column {
 }
 
 /// How a segment starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum InitialCondition {
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum InitialCondition {
     /// All earlier samples are zero, and all samples count.
     Zero,
     /// Nothing is known of earlier samples but those that were measured; inputs before these are zero.
@@ -209,7 +210,7 @@ impl Layout {
 /// The prediction errors of a record as a function of the parameters. Memory is taken when it is made; nothing that it
 /// does afterwards takes more, unless errors count linearly from somewhere on.
 #[derive(Debug)]
-pub(super) struct Predictor<'a> {
+pub(crate) struct Predictor<'a> {
     orders: Orders,
     /// One for each past that sections have; mostly one.
     layouts: Vec<Layout>,
@@ -264,8 +265,8 @@ impl<'a> Predictor<'a> {
     }
 
     /// Whether there are more initial conditions where inputs before those that were measured are unknown.
-    pub(super) fn has_unknown_inputs(record: &Record<'_>, orders: &Orders) -> bool {
-        let mut pasts = record.past.clone();
+    pub(super) fn has_unknown_inputs(past: &[usize], orders: &Orders) -> bool {
+        let mut pasts = past.to_vec();
         pasts.iter_mut().for_each(|past| *past = orders.history().min(*past));
         pasts.sort_unstable();
         pasts.dedup();
@@ -345,13 +346,48 @@ impl<'a> Predictor<'a> {
     /// By how much a column of psi is at most larger than what the initial-condition responses leave of it, at the current point.
     pub(super) fn cancellation(&self) -> f64 {
         let parameters = self.right.len();
-        let whole = |k: usize| {
-            let squares =
-                self.sections.iter().map(|section| section.gram[k * (parameters + section.free.len()) + k]);
-            squares.sum::<f64>()
-        };
-        let ratio = |k: usize| whole(k) / self.matrix[k * parameters + k];
+        let ratio = |k: usize| self.square_of(k) / self.matrix[k * parameters + k];
         (0..parameters).map(ratio).fold(1.0, f64::max).sqrt()
+    }
+
+    /// The square of a column of psi, the initial-condition responses not taken out, at the current point.
+    pub(super) fn square_of(&self, column: usize) -> f64 {
+        let parameters = self.right.len();
+        let square = |section: &Section<'_>| section.gram[column * (parameters + section.free.len() + 1)];
+        self.sections.iter().map(square).sum()
+    }
+
+    /// The sum of the outputs of the samples that count, and that of their squares.
+    pub(super) fn output_sums(&self) -> [f64; 2] {
+        let runs = self.sections.iter().flat_map(|own| own.runs.iter().map(|run| &own.output[run.clone()]));
+        runs.fold([0.0; 2], |[all, squares], run| {
+            [all + sum(run.iter().copied()), squares + sum_of_squares(run)]
+        })
+    }
+
+    /// The initial conditions of each segment.
+    pub(super) fn free_counts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.sections.iter().map(|section| section.free.len())
+    }
+
+    /// Sets the trial weights of the initial-condition responses, one segment after the other.
+    pub(super) fn set_free(&mut self, mut weights: &[f64]) {
+        for section in &mut self.sections {
+            let (own, rest) = weights.split_at(section.trial.len().min(weights.len()));
+            section.trial[..own.len()].copy_from_slice(own);
+            weights = rest;
+        }
+    }
+
+    /// The steps to the best weights, at the current point: for each segment that for no change of the parameters, then what each of
+    /// them takes from it.
+    pub(super) fn free_steps(&self) -> Vec<f64> {
+        self.sections.iter().flat_map(|section| &section.free_steps).copied().collect()
+    }
+
+    /// By how much the initial-condition responses alone can lower the cost, at the current point.
+    pub(super) fn free_gain(&self) -> f64 {
+        self.sections.iter().map(|section| section.free_gain).sum()
     }
 
     /// Forgets the weights of the initial-condition responses.
@@ -415,7 +451,7 @@ impl<'a> Predictor<'a> {
         for section in &self.sections {
             section.add_normal(&self.layouts[section.layout], &mut self.matrix, &mut self.right);
         }
-        self.sections.iter().map(|section| section.free_gain).sum()
+        self.free_gain()
     }
 
     /// The errors that count, and the segments of them that follow one another.

@@ -16,6 +16,17 @@ pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
     if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
 }
 
+/// The rows that starts see of many: such stretches, or of short segments every so many; none where these are all.
+pub(crate) fn seen_by_starts(segments: &[Range<usize>]) -> Option<Vec<Range<usize>>> {
+    let total: usize = segments.iter().map(Range::len).sum();
+    if total < LONG {
+        return None;
+    }
+    let every = total.div_ceil(STRETCHES * STRETCH);
+    let some = || segments.iter().step_by(every).cloned().collect();
+    Some(spread(segments, STRETCHES, STRETCH).unwrap_or_else(some))
+}
+
 /// The same of a record with several outputs, in longer stretches.
 pub(super) fn thinned_joint<'a>(record: &JointRecord<'a>) -> Option<JointRecord<'a>> {
     let total: usize = record.segments.iter().map(Range::len).sum();

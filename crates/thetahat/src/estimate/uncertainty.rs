@@ -31,6 +31,7 @@ mod holes;
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
 use holes::Holes;
@@ -42,7 +43,7 @@ use crate::model::polynomial::product;
 use crate::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_squares};
 
 /// The highest order of an autoregression of residuals.
-const HIGHEST: usize = 10;
+pub(super) const HIGHEST: usize = 10;
 /// Rows in memory at once.
 const ROWS: usize = 1024;
 /// From this many samples on, what the fit takes of v is nothing beside what is left.
@@ -111,9 +112,54 @@ fn power(monic: &[f64]) -> f64 {
 /// `taken` degrees of freedom were used by what left the residuals: sigma^2 = sum e^2/(N - k - taken). O(N).
 pub(crate) fn autoregression(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> Autoregression {
     let highest = highest(residuals, segments, taken);
-    let lagged = lagged(residuals, segments, highest);
-    let (matrix, right, square) = lagged.normal_equations();
-    chosen(&matrix, right, square, [lagged.rows(); 2], taken)
+    ErrorProducts::new(residuals, segments, highest).autoregression(taken)
+}
+
+/// What an autoregression of errors needs of some of them. That of all is the sum.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ErrorProducts {
+    /// For each order from 0 on, how many errors have so many before them.
+    rows: Vec<usize>,
+    known: usize,
+    /// The normal equations of the order, row by row.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    square: f64,
+}
+
+impl ErrorProducts {
+    pub(super) fn new(residuals: &[f64], segments: &[Range<usize>], order: usize) -> Self {
+        let (matrix, right, square) = lagged(residuals, segments, order).normal_equations();
+        Self {
+            rows: (0..=HIGHEST).map(|order| lagged(residuals, segments, order).rows()).collect(),
+            known: residuals.iter().filter(|error| !error.is_nan()).count(),
+            matrix: matrix.as_slice().to_vec(),
+            right: right.as_slice().to_vec(),
+            square,
+        }
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        self.rows.iter_mut().zip(&other.rows).for_each(|(own, more)| *own += more);
+        self.known += other.known;
+        self.matrix.iter_mut().zip(&other.matrix).for_each(|(own, more)| *own += more);
+        self.right.iter_mut().zip(&other.right).for_each(|(own, more)| *own += more);
+        self.square += other.square;
+    }
+
+    /// The highest order for this many samples: of short segments not too much is left out.
+    pub(super) fn highest(&self, taken: usize) -> usize {
+        let rows = |order: usize| self.rows.get(order).copied().unwrap_or(0);
+        highest_of(rows, [rows(0), self.known], taken)
+    }
+
+    /// The order of the least MDL and its autoregression.
+    pub(super) fn autoregression(self, taken: usize) -> Autoregression {
+        let order = self.right.len();
+        let rows = self.rows.get(order).copied().unwrap_or(0);
+        let matrix = DMatrix::from_vec(order, order, self.matrix);
+        chosen(&matrix, DVector::from_vec(self.right), self.square, [rows; 2], taken)
+    }
 }
 
 fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) -> Lagged<'a> {
@@ -125,9 +171,12 @@ fn lagged<'a>(residuals: &'a [f64], segments: &'a [Range<usize>], count: usize) 
 fn highest(residuals: &[f64], segments: &[Range<usize>], taken: usize) -> usize {
     let samples: usize = segments.iter().map(Range::len).sum();
     let known = residuals.iter().filter(|error| !error.is_nan()).count();
-    let enough = |count: &usize| {
-        2 * lagged(residuals, segments, *count).rows() >= samples && known.min(samples) > 4 * count + taken
-    };
+    highest_of(|order| lagged(residuals, segments, order).rows(), [samples, known], taken)
+}
+
+/// The same, where it is known how many errors have so many before them.
+fn highest_of(rows: impl Fn(usize) -> usize, [samples, known]: [usize; 2], taken: usize) -> usize {
+    let enough = |order: &usize| 2 * rows(*order) >= samples && known.min(samples) > 4 * order + taken;
     (1..=HIGHEST).rev().find(enough).unwrap_or(0)
 }
 

@@ -49,3 +49,14 @@ pub(super) fn solve_linear<O: Objective>(
     objective.try_free(step);
     objective.evaluate(parameters)
 }
+
+/// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order; none where there are no
+/// normal equations.
+pub(crate) fn predicted_decrease<O: Objective>(objective: &mut O) -> f64 {
+    let Ok(free_gain) = objective.linearize() else { return 0.0 };
+    let (mut factor, mut step) = (objective.matrix().to_vec(), objective.right().to_vec());
+    let size = step.len();
+    normal::factor(&mut factor, size);
+    normal::solve(&factor, size, &mut step);
+    free_gain + step.iter().zip(objective.right()).map(|(step, right)| step * right).sum::<f64>()
+}

@@ -10,8 +10,8 @@ use super::shares::Shares;
 use crate::data::{Log, Rows, Source, Split};
 use crate::distribution::chi_square_interval;
 use crate::estimate::{
-    Criteria, EquationsOutcome, Procedure,
-    equations::{EquationsEstimate, largest_likelihood},
+    Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, Procedure, Question,
+    equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
 };
 use crate::model::{EquationsModel, GreyBox, Model};
 use crate::optimize::{Monitor, Search};
@@ -123,6 +123,62 @@ pub fn fit_equations(
     plan: &EquationsPlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
+    fit(model, log, sources, plan, |experiments| {
+        largest_likelihood(model, experiments, &plan.search, monitor)
+    })
+}
+
+/// The same, but others compute the likelihood and its slopes for each point where the search stands: each holder has some of the logs
+/// that `log` is [joined](Log::join) of, `counts` of them, in their order, and gives an [`answer_equations`] to what `ask` hands on. One
+/// search begins after the other. For logs of a few rows too: a row costs O((n^3 + m n^2) p) operations.
+///
+/// # Errors
+/// As for [`fit_equations`], and what `ask` says; [`Error::Argument`] for a plan with rows to fit to or to validate on, or counts of other
+/// logs.
+pub fn fit_equations_distributed(
+    model: &GreyBox,
+    (log, sources): (&Log, &[Source]),
+    plan: &EquationsPlan,
+    counts: &[usize],
+    ask: Ask<'_>,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    if !plan.estimate.is_empty() || !plan.validate.is_empty() || plan.split.is_some() {
+        let message = "all rows serve for the fit; cut the experiments, and validate the model on other ones";
+        return Err(Error::argument("rows", message));
+    }
+    if counts.iter().sum::<usize>() != log.logs().count() {
+        return Err(Error::argument(
+            "counts",
+            "they are not those of the logs; count the logs of each holder",
+        ));
+    }
+    fit(model, log, sources, plan, |experiments| {
+        let holders = Holders::new(ask, counts.len());
+        let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
+        let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
+        holders.failure().map_or(found, Err)
+    })
+}
+
+/// What the logs of one holder answer, see [`fit_equations_distributed`].
+///
+/// # Errors
+/// [`Error::Argument`] if the question is about another model; [`Error::Data`] for a channel that is not there, and a step that the model
+/// cannot take.
+pub fn answer_equations(model: &GreyBox, log: &Log, question: &Question) -> Result<Answer, Error> {
+    let all = [Rows::new(1, log.rows())?];
+    question.answered_by_equations(model, &experiments(model, log, &all, &all)?)
+}
+
+/// The report of what a search finds in the experiments of a log.
+fn fit(
+    model: &GreyBox,
+    log: &Log,
+    sources: &[Source],
+    plan: &EquationsPlan,
+    search: impl FnOnce(&[Experiment]) -> Result<EquationsEstimate, Error>,
+) -> Result<Report, Error> {
     if model.parameters().is_empty() {
         return Err(Error::argument(
             "model",
@@ -141,7 +197,7 @@ pub fn fit_equations(
     }
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let fitted_to = experiments(model, log, &shares.estimation, &shares.estimation)?;
-    let found = largest_likelihood(model, &fitted_to, &plan.search, monitor)?;
+    let found = search(&fitted_to)?;
     let Errors { nis, mse } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
     let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());

@@ -175,7 +175,7 @@ fn fit(
     };
     let mut seen = rows(&orders)?;
     let task = estimate::Task {
-        record: &seen,
+        data: &seen,
         inputs: &plan.inputs,
         orders: &orders,
         method: &method,
@@ -199,7 +199,7 @@ fn fit(
             };
             let record = rows(&with_noise)?;
             let constant = if fitted.offset.is_some() { Constant::Yes } else { Constant::No };
-            let task = estimate::Task { record: &record, orders: &with_noise, method: &method, ..task };
+            let task = estimate::Task { data: &record, orders: &with_noise, method: &method, ..task };
             fitted = task.fit(constant, &beside, None)?;
             selection.steps.push(format!(
                 "After it an autoregression of order {order} describes what its free run leaves, for predictions: {with_noise}."
@@ -208,7 +208,7 @@ fn fit(
         }
     }
     let task = estimate::Task {
-        record: &seen,
+        data: &seen,
         orders: &orders,
         inputs: &plan.inputs,
         method: &method,

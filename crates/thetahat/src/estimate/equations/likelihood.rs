@@ -16,6 +16,7 @@
 
 use std::f64::consts::TAU;
 
+use serde::{Deserialize, Serialize};
 use thetahat_core::Dual;
 
 use crate::model::GreyBox;
@@ -24,13 +25,60 @@ use crate::respond::equations::{Experiment, Failure, Predictor, reach, step, wal
 /// Derivatives that are computed together.
 const LANE: usize = 4;
 
+/// V of a model as a function of the variables z, wherever the logs are.
+pub(crate) trait Likelihood {
+    /// The elements that are measured in rows that count.
+    fn measurements(&self) -> usize;
+
+    /// V.
+    fn evaluate(&mut self, z: &[f64]) -> Result<f64, Failure>;
+
+    /// Finds the slopes.
+    fn linearize(&mut self, z: &[f64]) -> Result<(), Failure>;
+
+    /// Those where V was linearised last.
+    fn slopes(&self) -> &Slopes;
+}
+
+/// What V does where it was linearised: sums over all elements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Slopes {
+    /// The sum of e^2/S.
+    pub(crate) squares: f64,
+    /// V_i.
+    pub(crate) gradient: Vec<f64>,
+    /// I, row by row.
+    pub(crate) information: Vec<f64>,
+}
+
+impl Slopes {
+    pub(crate) fn zero(size: usize) -> Self {
+        Self { squares: 0.0, gradient: vec![0.0; size], information: vec![0.0; size * size] }
+    }
+
+    fn clear(&mut self) {
+        self.squares = 0.0;
+        self.gradient.fill(0.0);
+        self.information.fill(0.0);
+    }
+
+    /// Sums of these and of others, which are as many.
+    pub(crate) fn add(&mut self, other: &Self) {
+        let add =
+            |all: &mut [f64], more: &[f64]| all.iter_mut().zip(more).for_each(|(all, more)| *all += more);
+        self.squares += other.squares;
+        add(&mut self.gradient, &other.gradient);
+        add(&mut self.information, &other.information);
+    }
+}
+
 /// V of a model on some logs, with the memory that it takes.
 #[derive(Debug)]
 pub(crate) struct LikelihoodObjective<'a> {
     model: &'a GreyBox,
     experiments: &'a [Experiment],
     /// The elements that are measured in rows that count.
-    pub(crate) measurements: usize,
+    measurements: usize,
     plain: Predictor<f64>,
     lanes: Vec<Predictor<Dual<f64, LANE>>>,
     /// The parameters as the lanes see them: variables in one, constants in the others.
@@ -38,12 +86,7 @@ pub(crate) struct LikelihoodObjective<'a> {
     /// e_i and S_i.
     error_slopes: Vec<f64>,
     variance_slopes: Vec<f64>,
-    /// The sum of e^2/S where V was linearised last.
-    pub(crate) squares: f64,
-    /// V_i where V was linearised last.
-    pub(crate) gradient: Vec<f64>,
-    /// I there, row by row.
-    pub(crate) information: Vec<f64>,
+    slopes: Slopes,
 }
 
 impl<'a> LikelihoodObjective<'a> {
@@ -62,14 +105,18 @@ impl<'a> LikelihoodObjective<'a> {
             variables: vec![vec![Dual::from(0.0); size]; lanes],
             error_slopes: vec![0.0; size],
             variance_slopes: vec![0.0; size],
-            squares: 0.0,
-            gradient: vec![0.0; size],
-            information: vec![0.0; size * size],
+            slopes: Slopes::zero(size),
         }
+    }
+}
+
+impl Likelihood for LikelihoodObjective<'_> {
+    fn measurements(&self) -> usize {
+        self.measurements
     }
 
     /// V. O(N (n^3 + m n^2)) and the model.
-    pub(crate) fn evaluate(&mut self, z: &[f64]) -> Result<f64, Failure> {
+    fn evaluate(&mut self, z: &[f64]) -> Result<f64, Failure> {
         let mut sum = 0.0;
         walk(self.model, self.experiments, &mut self.plain, z, |_, _, innovation| {
             sum += innovation.error * innovation.error / innovation.variance;
@@ -80,7 +127,7 @@ impl<'a> LikelihoodObjective<'a> {
 
     /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, and N p^2. Slopes that are not finite
     /// are a failure too.
-    pub(crate) fn linearize(&mut self, z: &[f64]) -> Result<(), Failure> {
+    fn linearize(&mut self, z: &[f64]) -> Result<(), Failure> {
         for (lane, variables) in self.variables.iter_mut().enumerate() {
             for (index, (variable, &value)) in variables.iter_mut().zip(z).enumerate() {
                 *variable = Dual::from(value);
@@ -89,10 +136,8 @@ impl<'a> LikelihoodObjective<'a> {
                 }
             }
         }
-        let size = self.gradient.len();
-        self.gradient.fill(0.0);
-        self.information.fill(0.0);
-        self.squares = 0.0;
+        let size = self.slopes.gradient.len();
+        self.slopes.clear();
         for (log, experiment) in self.experiments.iter().enumerate() {
             self.lanes.iter_mut().for_each(|lane| lane.restart(self.model));
             for row in 0..experiment.rows() {
@@ -120,20 +165,20 @@ impl<'a> LikelihoodObjective<'a> {
                         by_error.copy_from_slice(&innovation.error.derivatives[..by_error.len()]);
                         by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);
                     }
-                    self.squares += error * error / variance;
+                    self.slopes.squares += error * error / variance;
                     let surprise = (1.0 - error * error / variance) / (2.0 * variance);
                     for i in 0..size {
                         let (e, s) = (self.error_slopes[i], self.variance_slopes[i]);
-                        self.gradient[i] += error * e / variance + surprise * s;
+                        self.slopes.gradient[i] += error * e / variance + surprise * s;
                         let (by_error, by_variance) = (e / variance, s / (2.0 * variance * variance));
                         for j in 0..=i {
-                            self.information[i * size + j] +=
+                            self.slopes.information[i * size + j] +=
                                 by_error * self.error_slopes[j] + by_variance * self.variance_slopes[j];
                         }
                     }
                 }
                 // What is not a number stays in the sums.
-                let sums = self.gradient.iter().chain(&self.information);
+                let sums = self.slopes.gradient.iter().chain(&self.slopes.information);
                 if !sums.copied().all(f64::is_finite) {
                     return Err(failure);
                 }
@@ -141,9 +186,13 @@ impl<'a> LikelihoodObjective<'a> {
         }
         for i in 0..size {
             for j in 0..i {
-                self.information[j * size + i] = self.information[i * size + j];
+                self.slopes.information[j * size + i] = self.slopes.information[i * size + j];
             }
         }
         Ok(())
+    }
+
+    fn slopes(&self) -> &Slopes {
+        &self.slopes
     }
 }

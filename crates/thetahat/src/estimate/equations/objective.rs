@@ -16,15 +16,15 @@
 //! The search stops when the predicted decrease is below the tolerance times max(N, sum e^2/S), N the elements that were measured. That
 //! is 2 V without its logarithms, which may be of either sign.
 
-use super::likelihood::LikelihoodObjective;
+use super::likelihood::{Likelihood, Slopes};
 use crate::model::{GreyBox, equations::Scale};
 use crate::optimize::{Objective, StepRules};
-use crate::respond::equations::{Experiment, Failure};
+use crate::respond::equations::Failure;
 
 /// -2 ln L as a function of the variables z.
 #[derive(Debug)]
-pub(super) struct Deviance<'a> {
-    criterion: LikelihoodObjective<'a>,
+pub(super) struct Deviance<L> {
+    pub(super) criterion: L,
     /// Which parameters have a bound.
     bounded: Vec<bool>,
     /// Where it was evaluated last.
@@ -34,13 +34,13 @@ pub(super) struct Deviance<'a> {
     right: Vec<f64>,
 }
 
-impl<'a> Deviance<'a> {
-    pub(super) fn new(model: &'a GreyBox, experiments: &'a [Experiment]) -> Self {
+impl<L: Likelihood> Deviance<L> {
+    pub(super) fn new(model: &GreyBox, criterion: L) -> Self {
         let bounded: Vec<bool> =
             model.parameters().iter().map(|unknown| unknown.scale != Scale::Free).collect();
         let size = bounded.len();
         Self {
-            criterion: LikelihoodObjective::new(model, experiments),
+            criterion,
             bounded,
             z: vec![0.0; size],
             matrix: vec![0.0; size * size],
@@ -49,13 +49,13 @@ impl<'a> Deviance<'a> {
     }
 }
 
-impl Objective for Deviance<'_> {
+impl<L: Likelihood> Objective for Deviance<L> {
     type Refusal = Failure;
 
     const STEP_RULES: StepRules = StepRules { shortenings: 0, lengthens: true };
 
     fn samples(&self) -> usize {
-        self.criterion.measurements
+        self.criterion.measurements()
     }
 
     /// A point at which the filter does not work has no cost.
@@ -66,7 +66,7 @@ impl Objective for Deviance<'_> {
 
     fn linearize(&mut self) -> Result<f64, Failure> {
         self.criterion.linearize(&self.z)?;
-        let LikelihoodObjective { gradient, information, .. } = &self.criterion;
+        let Slopes { gradient, information, .. } = self.criterion.slopes();
         let size = gradient.len();
         self.matrix.copy_from_slice(information);
         for (index, gradient) in gradient.iter().enumerate() {
@@ -87,11 +87,11 @@ impl Objective for Deviance<'_> {
     }
 
     fn scale(&self, _cost: f64) -> f64 {
-        (self.criterion.measurements as f64).max(self.criterion.squares)
+        (self.criterion.measurements() as f64).max(self.criterion.slopes().squares)
     }
 
     /// -ln L for each element.
     fn mean(&self, cost: f64) -> f64 {
-        cost / 2.0 / self.criterion.measurements as f64
+        cost / 2.0 / self.criterion.measurements() as f64
     }
 }

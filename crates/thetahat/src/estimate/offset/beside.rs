@@ -42,9 +42,9 @@ impl Beside {
         Ok(Self { rows: log.rows(), ramp, middle, half, sample_time: log.sample_time() })
     }
 
-    /// A constant alone, without rows of its own.
-    pub(super) fn constant(sample_time: f64) -> Self {
-        Self { rows: 0, ramp: None, middle: 0.0, half: 1.0, sample_time }
+    /// A constant alone, for so many rows.
+    pub(crate) fn constant(rows: usize, sample_time: f64) -> Self {
+        Self { rows, ramp: None, middle: 0.0, half: 1.0, sample_time }
     }
 
     /// Whether there is a trend beside the constant.

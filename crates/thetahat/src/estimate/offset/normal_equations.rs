@@ -73,7 +73,7 @@ impl LinearProblem<'_> {
     }
 
     fn beside(&self) -> Beside {
-        Beside::constant(self.sample_time)
+        Beside::constant(0, self.sample_time)
     }
 
     fn columns(&self) -> Vec<Column> {

@@ -1,12 +1,12 @@
 //! Whether a constant is worth its parameter.
 
 use super::super::arx::with_past;
+use super::super::experiments::{Experiments, PredictionErrors};
 use super::super::prediction_error::predictor_of;
-use super::super::uncertainty::autoregression;
 use super::super::{Estimate, Initial, Norm, Procedure, arx};
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::best_free;
+use crate::optimize::{Objective, best_free};
 use crate::regression::{Presample, sum};
 
 /// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
@@ -14,12 +14,11 @@ const DEPENDENT: f64 = 1e-9;
 
 /// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their autoregression.
 /// None where they cannot be computed.
-pub(super) fn white_samples(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> Option<f64> {
-    let mut predictor = predictor_of(record, orders, estimate);
+pub(super) fn white_samples(data: &impl Experiments, orders: &Orders, estimate: &Estimate) -> Option<f64> {
+    let mut predictor = predictor_of(data, orders, estimate);
     best_free(&mut predictor, estimate.parameters()).ok()?;
-    let (residuals, segments) = predictor.residuals();
     let taken = orders.parameters() + predictor.initial_conditions();
-    Some(1.0 / autoregression(&residuals, &segments, taken).at_zero().max(1.0))
+    Some(1.0 / predictor.autoregression(taken)?.at_zero().max(1.0))
 }
 
 /// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the likelihood of

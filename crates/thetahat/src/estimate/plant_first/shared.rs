@@ -180,7 +180,7 @@ pub(super) fn plant(
         outcomes.swap(0, winner);
         Ok(best.map(|best| Reached { starts: outcomes, ..best }))
     };
-    let widest = if Predictor::has_unknown_inputs(record, plant) {
+    let widest = if Predictor::has_unknown_inputs(&record.past, plant) {
         InitialCondition::UnknownInputs
     } else {
         InitialCondition::Unknown

@@ -11,8 +11,9 @@ use super::{Job, Problem};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{
+    experiments::PredictionErrors,
     polynomials::extended,
-    predictor::{InitialCondition, Predictor},
+    predictor::InitialCondition,
     start::Plants,
     stretches::{filled, stretches},
 };
@@ -83,7 +84,7 @@ impl Job<'_> {
     /// Where a search leads from the best of some starts: best after a few iterations of those that cost least.
     fn optimum(
         &self,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut impl PredictionErrors,
         starts: Vec<Vec<f64>>,
     ) -> Result<Option<Vec<f64>>, Error> {
         let costs = starts.into_iter().filter_map(|start| Some((best_free(predictor, &start).ok()?, start)));

@@ -10,12 +10,13 @@ use rayon::prelude::*;
 use super::nested::thinned;
 use super::{Job, Problem, TrackStart, hopeless};
 use crate::Error;
+use crate::estimate::experiments::PredictionErrors;
 use crate::estimate::outcome::StartOutcome;
-use crate::estimate::predictor::{InitialCondition, Predictor};
+use crate::estimate::predictor::InitialCondition;
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
 use crate::estimate::stretches::filled;
-use crate::optimize::{Algorithm, Found, Search, best_free, best_linear};
+use crate::optimize::{Algorithm, Found, Search, best_free, best_linear, predicted_decrease};
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;
@@ -46,7 +47,7 @@ impl Job<'_> {
     pub(super) fn ranked(
         &self,
         problem: Problem<'_, '_>,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut impl PredictionErrors,
     ) -> Result<TrackStart, Error> {
         let Problem { record, orders, .. } = problem;
         let given = self.options.initial_parameters.iter().map(|given| (GIVEN, given.clone()));
@@ -113,7 +114,7 @@ impl Job<'_> {
     fn nested_starts(
         &self,
         problem: Problem<'_, '_>,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut impl PredictionErrors,
     ) -> Result<Vec<Start>, Error> {
         let nested = self.nested(problem)?;
         Ok(nested.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor)).collect())
@@ -123,7 +124,7 @@ impl Job<'_> {
     pub(super) fn nested_below(
         &self,
         problem: Problem<'_, '_>,
-        predictor: &mut Predictor<'_>,
+        predictor: &mut impl PredictionErrors,
         lowest: f64,
     ) -> Result<Option<(StartOutcome, Vec<f64>)>, Error> {
         let mut starts = self.nested_starts(problem, predictor)?;
@@ -134,7 +135,7 @@ impl Job<'_> {
 
     /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them by
     /// what they reach.
-    fn compare(&self, predictor: &mut Predictor<'_>, starts: &mut [Start]) -> Result<(), Error> {
+    fn compare(&self, predictor: &mut impl PredictionErrors, starts: &mut [Start]) -> Result<(), Error> {
         let samples = predictor.samples() as f64;
         let mut limit = f64::INFINITY;
         for (iterations, within) in ROUNDS {
@@ -190,7 +191,7 @@ impl Job<'_> {
 }
 
 impl Start {
-    fn new(name: &str, parameters: Vec<f64>, predictor: &mut Predictor<'_>) -> Self {
+    fn new(name: &str, parameters: Vec<f64>, predictor: &mut impl PredictionErrors) -> Self {
         let cost = best_free(predictor, &parameters).ok();
         let outcome = StartOutcome {
             name: name.to_owned(),
@@ -208,7 +209,7 @@ fn sort(starts: &mut [Start]) {
 
 /// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
 /// predicted by a step of Gauss and Newton, for a long record on segments of it.
-fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predictor<'_>) -> bool {
+fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut impl PredictionErrors) -> bool {
     let mut recipes: Vec<(&str, &Start)> = Vec::new();
     for start in starts.iter().filter(|start| start.cost.is_finite()) {
         let recipe = start.outcome.name.trim_end_matches("-refined");
@@ -229,11 +230,11 @@ fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut Predi
     }
 }
 
-fn lead_apart(recipes: &[&Start], predictor: &mut Predictor<'_>) -> bool {
+fn lead_apart(recipes: &[&Start], predictor: &mut impl PredictionErrors) -> bool {
     // The cost at a start, and where it leads.
     let mut followed = |start: &Start| {
         let cost = best_free(predictor, &start.parameters).ok()?;
-        Some((cost, cost - predictor.predicted_decrease()))
+        Some((cost, cost - predicted_decrease(predictor)))
     };
     let Some((cost, lowest)) = followed(recipes[0]) else { return true };
     lowest < (1.0 - FAR) * cost

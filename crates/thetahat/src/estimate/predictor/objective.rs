@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Predictor;
 use crate::estimate::polynomials::Unusable;
-use crate::optimize::{Objective, normal};
+use crate::optimize::Objective;
 
 impl Objective for Predictor<'_> {
     type Refusal = Unusable;
@@ -56,18 +56,5 @@ impl Objective for Predictor<'_> {
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
         self.border.draw_in(from, trial)
-    }
-}
-
-impl Predictor<'_> {
-    /// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order.
-    pub(in crate::estimate) fn predicted_decrease(&mut self) -> f64 {
-        let size = self.right.len();
-        let free_gain = self.linearize();
-        let mut factor = self.matrix.clone();
-        let mut step = self.right.clone();
-        normal::factor(&mut factor, size);
-        normal::solve(&factor, size, &mut step);
-        free_gain + step.iter().zip(&self.right).map(|(step, right)| step * right).sum::<f64>()
     }
 }

@@ -1,3 +1,4 @@
+mod distributed;
 mod examples;
 mod experiments;
 mod gradient;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::models::{Found, experiment, joined};
 use crate::data::{Channel, Recording, Source, Times};
-use crate::estimate::equations::LikelihoodObjective;
+use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::{GreyBox, Model};
 use crate::optimize::Stopped;
@@ -91,7 +91,7 @@ fn gradient_of_models_in_equations_is_exact() {
         let mut criterion = LikelihoodObjective::new(&model, &experiments);
         let z: Vec<f64> = model.parameters().iter().map(|unknown| unknown.start_variable().0 - 0.2).collect();
         criterion.linearize(&z).unwrap();
-        let (gradient, value) = (criterion.gradient.clone(), criterion.evaluate(&z).unwrap());
+        let (gradient, value) = (criterion.slopes().gradient.clone(), criterion.evaluate(&z).unwrap());
         for (index, slope) in gradient.iter().enumerate() {
             let width = 1e-5;
             let mut at = |steps: f64| {

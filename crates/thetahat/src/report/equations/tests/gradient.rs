@@ -1,7 +1,7 @@
 use thetahat_core::nalgebra::DMatrix;
 
 use super::models::{TRUTH, experiment, holed, log, pendulum, pendulum_text};
-use crate::estimate::equations::LikelihoodObjective;
+use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::GreyBox;
 
@@ -14,7 +14,8 @@ fn gradient_and_value_agree() {
         let mut criterion = LikelihoodObjective::new(&model, &experiments);
         let z: Vec<f64> = truth.iter().map(|truth| 1.1 * truth + 0.05).collect();
         criterion.linearize(&z).unwrap();
-        let (gradient, information) = (criterion.gradient.clone(), criterion.information.clone());
+        let (gradient, information) =
+            (criterion.slopes().gradient.clone(), criterion.slopes().information.clone());
         for index in 0..parameters {
             let width = 1e-6;
             let mut at = |side: f64| {
@@ -83,7 +84,7 @@ fn a_known_start_and_no_noise_inside_are_output_error() {
     assert!((value - sum / 2.0).abs() < 1e-12 * value.abs(), "{value} {}", sum / 2.0);
     // And it has a gradient.
     criterion.linearize(&z).unwrap();
-    let gradient = criterion.gradient.clone();
+    let gradient = criterion.slopes().gradient.clone();
     for index in 0..3 {
         let mut at = |width: f64| {
             let mut z = z;

@@ -261,19 +261,27 @@ impl<'a> Holders<'a> {
         Ok((squares - sum * sum / count).max(0.0).sqrt())
     }
 
-    /// Some rows of each holder's channels, the output last, and the energy of the output in all rows.
+    /// Some rows of each holder, one channel after the other, the output last; and the energy of the output in all rows.
     ///
     /// # Errors
     /// What made an answer fail.
-    pub(crate) fn rows(&self, rows: &[Vec<Range<usize>>]) -> Result<(Vec<Vec<Vec<f64>>>, f64), Error> {
+    pub(crate) fn rows(
+        &self,
+        rows: &[Vec<Range<usize>>],
+        channels: usize,
+    ) -> Result<(Vec<Vec<f64>>, f64), Error> {
         let question = |holder: usize| Asked::Rows(rows.get(holder).cloned().unwrap_or_default());
         let found = self.answers(question, |found| match found {
-            Found::Rows { channels, energy } => Some((channels, energy)),
+            Found::Rows { channels: own, energy } if own.len() == channels => Some((own, energy)),
             _ => None,
         });
         let found = found.ok_or_else(|| self.failure().unwrap_or(Error::Interrupted))?;
-        let energy = found.iter().map(|(_, energy)| energy).sum();
-        Ok((found.into_iter().map(|(channels, _)| channels).collect(), energy))
+        let (mut joined, mut energy) = (vec![Vec::new(); channels], 0.0);
+        for (own, more) in found {
+            joined.iter_mut().zip(own).for_each(|(all, mut own)| all.append(&mut own));
+            energy += more;
+        }
+        Ok((joined, energy))
     }
 }
 

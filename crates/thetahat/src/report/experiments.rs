@@ -387,17 +387,15 @@ impl Near {
             let holder = firsts.partition_point(|first| *first <= own.start) - 1;
             asked[holder].push(own.start - firsts[holder]..own.end - firsts[holder]);
         }
-        let (found, energy) = holders.rows(&asked)?;
-        let channels = (0..all.channels.len())
-            .map(|channel| found.iter().filter_map(|own| own.get(channel)).flatten().copied().collect());
+        let (channels, energy) = holders.rows(&asked, all.channels.len())?;
         let mut end = 0;
         let segments = wanted.iter().map(|own| {
             end += own.len();
             end - own.len()..end
         });
         let segments = segments.collect();
-        let near = Self { channels: channels.collect(), segments, is_all, energy };
-        if near.channels.iter().any(|own: &Vec<f64>| own.len() != near.rows()) {
+        let near = Self { channels, segments, is_all, energy };
+        if near.channels.iter().any(|own| own.len() != near.rows()) {
             return Err(Error::data("holders have other rows than they described; describe them again"));
         }
         Ok(near)

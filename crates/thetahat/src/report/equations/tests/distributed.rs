@@ -2,7 +2,7 @@ use std::ops::ControlFlow;
 
 use crate::Error;
 use crate::data::{Channel, Log, Rows};
-use crate::estimate::{Answer, Question};
+use crate::estimate::{Answer, Ask, Question};
 use crate::model::GreyBox;
 use crate::random::Random;
 use crate::report::{EquationsPlan, Report, answer_equations, fit_equations, fit_equations_distributed};
@@ -85,7 +85,7 @@ fn what_cannot_be_is_said() {
     assert!(distributed(&logs, 1, &plan).unwrap_err().to_string().contains("all rows serve"));
     let plan = EquationsPlan::default();
     let joined = Log::join(logs.clone()).unwrap();
-    let fit = |counts: &[usize], ask: &dyn Fn(&[Question]) -> Result<Vec<Answer>, Error>| {
+    let fit = |counts: &[usize], ask: Ask<'_>| {
         let found = fit_equations_distributed(&tank(), (&joined, &[]), &plan, counts, ask, &|_| {
             ControlFlow::Continue(())
         });

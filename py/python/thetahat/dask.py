@@ -24,7 +24,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import PurePosixPath
-from typing import Any, Union
+from typing import Any, NamedTuple, Union
 
 import dask
 import dask.bag
@@ -49,6 +49,8 @@ _TASKS = 16
 """A task has one log unless each worker has more tasks than this: the scheduler takes some milliseconds for a task."""
 _MOST = 32
 """The logs of a task, at most: so many are done again when a worker is lost."""
+_FRONT = 16
+"""Rows at the front of some pieces beside those that the model reaches back to: their steps are its sample time."""
 
 
 def fit_many(
@@ -186,15 +188,17 @@ def normal_equations(
     """
     work = _many.Work(read=dict(read or {}))
     lags = 0 if experiments else _lags(**orders)
-    # A task has some pieces that follow one another, one after the other in memory. The last one is read again for its end.
-    runs = _runs(_pieces(logs))
-    pasts: list[Any] = [None]
-    for run in runs[:-1]:
-        pasts.append(dask.delayed(_past)(pasts[-1], dask.delayed(_end)(work, run, lags), lags) if lags else None)
-    sums = [dask.delayed(_sums)(work, run, past, lags, orders) for run, past in zip(runs, pasts)]
+    # A task has some pieces that follow one another, one after the other in memory. The rows at the front of its first one, which
+    # reach back to those before, are a piece of their own: so each is read once, and no task waits for another.
+    runs = _runs(_pieces(logs), finer=4)
+    parts = [dask.delayed(_part)(work, run, lags + _FRONT if place and lags else 0, lags, orders) for place, run in enumerate(runs)]
+    sums, end = parts[:1], parts[0]
+    for part in parts[1:]:
+        sums += [dask.delayed(_front)(end, part, orders), part] if lags else [part]
+        end = dask.delayed(_later_end)(end, part, lags)
     while len(sums) > 1:
         sums = [dask.delayed(_merged)(*sums[first : first + 2]) for first in range(0, len(sums), 2)]
-    return sums[0]
+    return dask.delayed(_merged)(*sums)
 
 
 def fit_experiments(
@@ -318,9 +322,9 @@ def _pieces(logs: Logs) -> list[tuple[str, Any]]:
     return named
 
 
-def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None) -> list[Sequence[tuple[str, Any]]]:
+def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None, finer: int = 1) -> list[Sequence[tuple[str, Any]]]:
     """What each task has. How much does not depend on the workers: the same pieces give the same bytes."""
-    count = _count(per_task, max(1, min(_MOST, len(named) // _TASKS)))
+    count = _count(per_task, max(1, min(_MOST, len(named) // (finer * _TASKS))))
     return [named[first : first + count] for first in range(0, len(named), count)]
 
 
@@ -397,17 +401,6 @@ def _columns(log: Log, rows: slice = slice(None)) -> dict[str | None, Any]:
     return columns
 
 
-def _end(work: _many.Work, run: Sequence[tuple[str, Any]], lags: int) -> dict[str | None, Any]:
-    """The last rows of some pieces that follow one another."""
-    end: dict[str | None, Any] | None = None
-    for name, item in reversed(run):
-        last = _columns(_loaded(work, name, item), slice(-lags, None))
-        end = {channel: values.copy() for channel, values in last.items()} if end is None else _past(last, end, lags)
-        if all(len(values) == lags for values in end.values()):
-            break
-    return end or {}
-
-
 def _past(before: dict[str | None, Any] | None, end: dict[str | None, Any], lags: int) -> dict[str | None, Any]:
     """The last rows of a piece, and of those before it where it is short."""
     if before is None:
@@ -415,46 +408,77 @@ def _past(before: dict[str | None, Any] | None, end: dict[str | None, Any], lags
     return {name: numpy.concatenate([before[name], values])[-lags:] if name in before else values for name, values in end.items()}
 
 
-def _sums(
-    work: _many.Work,
-    run: Sequence[tuple[str, Any]],
-    past: dict[str | None, Any] | None,
-    lags: int,
-    orders: Mapping[str, Any],
-) -> _NormalEquations:
-    """The sums of some pieces that follow one another."""
+class _Part(NamedTuple):
+    """What a task has found in some pieces that follow one another."""
+
+    sums: _NormalEquations | None
+    """Of all rows but those of the front; none if there are no others."""
+    front: dict[str | None, Any]
+    end: dict[str | None, Any]
+    """The last rows."""
+    first: Log
+    """A row of the first piece, for its channels."""
+    name: str
+
+
+def _part(work: _many.Work, run: Sequence[tuple[str, Any]], front: int, lags: int, orders: Mapping[str, Any]) -> _Part:
+    """The sums of some pieces that follow one another, of which the first rows are the front."""
     sums: _NormalEquations | None = None
+    own: dict[str | None, Any] | None = None
+    past: dict[str | None, Any] | None = None
+    first: Log | None = None
     with _shared():
         for name, item in run:
             log = _loaded(work, name, item)
+            first = log[:1] if first is None else first
             with _in_piece(name):
-                if past is None:
-                    piece = _NormalEquations(log, **orders)
-                else:
-                    piece = _NormalEquations(_after(past, log, name), past=len(next(iter(past.values()))), **orders)
+                rows = min(front, len(log))
+                front -= rows
+                if rows:
+                    taken = {channel: values.copy() for channel, values in _columns(log, slice(rows)).items()}
+                    own = taken if own is None else _joined_columns(own, taken)
+                if rows < len(log):
+                    before = rows + (0 if past is None else len(next(iter(past.values()))))
+                    piece = _NormalEquations(log if past is None else _after(past, _columns(log), log, name), past=before, **orders)
+                    sums = piece if sums is None else sums.merge(piece)
             if lags:
                 past = _past(past, _columns(log, slice(-lags, None)), lags)
-            sums = piece if sums is None else sums.merge(piece)
-    if sums is None:
+    if first is None:
         raise ValueError("logs: there is none; give at least one piece")
-    return sums
+    end = {channel: values.copy() for channel, values in (past or {}).items()}
+    return _Part(sums, own or {}, end, first, run[0][0])
 
 
-def _after(past: dict[str | None, Any], log: Log, name: str) -> Log:
-    """A piece with the rows before it in front."""
-    columns = _columns(log)
-    if list(past) != list(columns):
-        own, other = (", ".join(str(name or "a clock") for name in names) for names in (columns, past))
-        raise ValueError(f"it has {own}, the piece before it {other}; give all the same columns")
-    for channel, values in columns.items():
-        columns[channel] = numpy.concatenate([past[channel], values])
-    clock = {"time": columns[None]} if None in columns else {"sample_time": log.sample_time}
-    outputs, inputs = ({name: columns[name] for name in names} for names in (log.outputs, log.inputs))
+def _front(before: _Part, part: _Part, orders: Mapping[str, Any]) -> _NormalEquations:
+    """The sums of the front of some pieces, which reaches back to the rows before."""
+    with _in_piece(part.name):
+        rows = len(next(iter(before.end.values())))
+        return _NormalEquations(_after(before.end, part.front, part.first, part.name), past=rows, **orders)
+
+
+def _later_end(before: _Part, part: _Part, lags: int) -> _Part:
+    """What is known of the last rows of some pieces after others."""
+    return part._replace(sums=None, front={}, end=_past(before.end, part.end, lags)) if lags else part
+
+
+def _joined_columns(one: dict[str | None, Any], other: dict[str | None, Any]) -> dict[str | None, Any]:
+    if list(one) != list(other):
+        own, before = (", ".join(str(name or "a clock") for name in names) for names in (other, one))
+        raise ValueError(f"it has {own}, the piece before it {before}; give all the same columns")
+    return {name: numpy.concatenate([values, other[name]]) for name, values in one.items()}
+
+
+def _after(past: dict[str | None, Any], rows: dict[str | None, Any], like: Log, name: str) -> Log:
+    """Rows with those before them in front, as a log with the channels of another."""
+    columns = _joined_columns(past, rows)
+    clock = {"time": columns[None]} if None in columns else {"sample_time": like.sample_time}
+    outputs, inputs = ({name: columns[name] for name in names} for names in (like.outputs, like.inputs))
     return _called(Log(outputs, inputs or None, **clock), name)
 
 
-def _merged(*sums: _NormalEquations) -> _NormalEquations:
-    return sums[0].merge(*sums[1:])
+def _merged(*found: _NormalEquations | _Part) -> _NormalEquations | None:
+    sums = [one for one in ((part.sums if isinstance(part, _Part) else part) for part in found) if one is not None]
+    return sums[0].merge(*sums[1:]) if sums else None
 
 
 @contextmanager

@@ -2,14 +2,15 @@
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::{AboutErrors, Answer, Asked, Factor, Found, LikelihoodSums, ModelErrors, Point, Question, Sums};
+use super::likelihood::LikelihoodSums;
+use super::message::{AboutErrors, Answer, Asked, Factor, Found, ModelErrors, Point, Question, Sums};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::arx::rows;
 use crate::estimate::predictor::Predictor;
 use crate::estimate::stretches::energy;
-use crate::estimate::uncertainty::ErrorProducts;
-use crate::model::GreyBox;
+use crate::estimate::uncertainty::{ErrorProducts, HIGHEST};
+use crate::model::{GreyBox, Orders};
 use crate::respond::equations::Experiment;
 
 impl Question {
@@ -30,9 +31,12 @@ impl Question {
                 Ok(Answer(Found::Rows { channels, energy: energy(record) }))
             }
             Asked::Errors(model, about) => {
-                let ones = vec![vec![1.0; record.output.len()]; model.constants];
+                // What indexes anything is checked here.
+                let Orders { na, nb, nc, nd, nf, nk } = &model.orders;
+                let valid = Orders::new(*na, nb, *nc, *nd, nf, nk).is_ok();
+                let ones = vec![vec![1.0; record.output.len()]; model.constants.min(1)];
                 let record = record.with_inputs(&ones);
-                let fits = record.inputs.len() == model.orders.inputs();
+                let fits = valid && record.inputs.len() == model.orders.inputs();
                 let found = fits.then(|| about.answered_by(model, &record)).flatten();
                 found.map(Answer).ok_or_else(foreign)
             }
@@ -65,6 +69,9 @@ fn foreign() -> Error {
 impl AboutErrors {
     /// None if the question does not fit the data.
     fn answered_by(&self, model: &ModelErrors, record: &Record<'_>) -> Option<Found> {
+        if matches!(self, Self::Autoregression(_, order) if *order > HIGHEST) {
+            return None;
+        }
         let mut errors = Predictor::new(record, &model.orders, model.begin);
         let size = model.orders.parameters();
         let free: Vec<usize> = errors.free_counts().collect();
@@ -115,5 +122,15 @@ impl Sums {
         let vectors = [&self.matrix, &self.right, &self.diagonal, &self.free_steps];
         let mut all = vectors.into_iter().flatten().chain([&self.cost, &self.free_gain]);
         all.all(|value| value.is_finite())
+    }
+}
+
+impl Predictor<'_> {
+    /// At a point; none where the errors overflow.
+    fn stand_at(&mut self, at: &Point) -> Option<f64> {
+        self.set_free(&at.free);
+        let cost = self.evaluate(&at.parameters).ok()?;
+        self.linearize();
+        Some(cost)
     }
 }

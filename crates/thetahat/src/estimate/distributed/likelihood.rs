@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Asked, Found, Holders};
+use super::Holders;
+use super::message::{Asked, Found};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective, Slopes};
 use crate::model::GreyBox;
 use crate::respond::equations::{Experiment, Failure};

@@ -311,7 +311,8 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, control, track, filter or design writes
+        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, control, track, filter or design writes, or
+        /// the normal equations of a piece of the data
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },
@@ -364,6 +365,8 @@ pub(crate) enum DocumentArgument {
     Filter,
     /// What design writes for a model
     Design,
+    /// What normal equations are written as, in Python and in the crate
+    NormalEquations,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -1,5 +1,7 @@
 //! What a first user meets: the demo, the help and its examples, manual pages and completions.
 
+use serde_json::Value;
+
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
@@ -123,6 +125,31 @@ fn help_lists_the_verbs_and_the_exit_codes() {
         "130  interrupted",
     ] {
         assert!(help.contains(&format!("\n  {code}")), "{code}");
+    }
+}
+
+#[test]
+fn every_document_has_a_schema() {
+    let folder = Folder::new();
+    for name in [
+        "report",
+        "validation",
+        "comparison",
+        "inspection",
+        "response",
+        "step",
+        "tuning",
+        "control",
+        "track",
+        "filter",
+        "design",
+        "normal-equations",
+    ] {
+        let schema: Value =
+            serde_json::from_str(&folder.done(&format!("schema {name}")).stdout).expect("it is JSON");
+        let description = schema["description"].as_str().unwrap_or_default();
+        assert!(description.contains(&format!("`thetahat.{name}/1`")), "{description}");
+        assert_eq!(schema["properties"]["schema"]["type"], "string", "{name}");
     }
 }
 

@@ -6,7 +6,7 @@ use thetahat::control::Control;
 use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::Inspection;
-use thetahat::report::{Comparison, Report, Validation};
+use thetahat::report::{Comparison, NormalEquations, Report, Validation};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
 use thetahat::track::TrackSummary;
@@ -30,6 +30,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
         DocumentArgument::Design => ExperimentDesign::json_schema(),
+        DocumentArgument::NormalEquations => NormalEquations::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))
 }

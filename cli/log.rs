@@ -123,30 +123,77 @@ const PART: usize = 1 << 20;
 /// What is left at the end of a log and has fewer rows than this belongs to the part before it.
 const FEW: usize = 1 << 10;
 
-/// A part of a log that is read in several: the rows, with some of the part before it in front.
+/// A part of a log that is read in several.
 #[derive(Debug)]
-pub(crate) struct Piece {
-    pub(crate) log: Log,
+pub(crate) struct Part<'l> {
+    /// The rows, with some of the part before it in front.
+    pub(crate) recording: Recording,
     /// The log's name, with the rows of the part that are its own.
     pub(crate) source: Source,
     /// How many rows are of the part before it.
     pub(crate) past: usize,
+    file: &'l str,
+    lines: Lines,
+    /// How many rows there were before it.
+    before: usize,
 }
 
-/// Reads the columns of a log that `choose` names, each part with as many rows of the one before it as it says, and hands them
-/// on with what it chose: memory does not grow with the rows. Gives what the reader should know, in plain words.
+impl Part<'_> {
+    /// The rows, which are then no longer here.
+    pub(crate) fn taken(&mut self) -> Recording {
+        let empty = Recording { channels: Vec::new(), times: Times::Uniform(1.0) };
+        std::mem::replace(&mut self.recording, empty)
+    }
+
+    /// What the library says of its rows, with the line.
+    pub(crate) fn failure(&self, error: &Error) -> Failure {
+        // Rows of the part before it have no line here; what a clock says of them it has said before.
+        let place = |row: usize| self.lines.place(self.file, row.saturating_sub(self.past + 1), self.before);
+        Failure::about(error, |row| row.map_or_else(|| self.file.to_owned(), place))
+    }
+}
+
+/// A part of a log whose clock is uniform.
+#[derive(Debug)]
+pub(crate) struct Piece {
+    pub(crate) log: Log,
+    pub(crate) source: Source,
+    pub(crate) past: usize,
+}
+
+/// As [`in_parts`], of a log whose clock is uniform.
 pub(crate) fn in_pieces<T>(
     path: &Path,
     job: &LogJob,
     choose: impl FnOnce(&[String]) -> Result<(Vec<String>, usize, T), Failure>,
     take: &mut dyn FnMut(&T, Piece) -> Result<(), Failure>,
 ) -> Result<Vec<String>, Failure> {
+    let choose = |reader: &Reader| choose(reader.names());
+    in_parts(path, job, choose, &mut |chosen, mut part| {
+        let Recording { channels, times } = part.taken();
+        let log = match times {
+            Times::Measured(time) => Log::with_time(channels, time),
+            Times::Uniform(step) => Log::new(channels, step),
+        };
+        let log = log.map_err(|error| part.failure(&error))?;
+        take(chosen, Piece { log, source: part.source, past: part.past })
+    })
+}
+
+/// Reads the columns of a log that `choose` names, each part with as many rows of the one before it as it says, and hands them
+/// on with what it chose: memory does not grow with the rows. Gives what the reader should know, in plain words.
+pub(crate) fn in_parts<T>(
+    path: &Path,
+    job: &LogJob,
+    choose: impl FnOnce(&Reader) -> Result<(Vec<String>, usize, T), Failure>,
+    take: &mut dyn FnMut(&T, Part<'_>) -> Result<(), Failure>,
+) -> Result<Vec<String>, Failure> {
     let reader = Reader::open(path, &job.options)?;
     let file = path.display().to_string();
-    let (names, lags, chosen) = choose(reader.names())?;
+    let (names, lags, chosen) = choose(&reader)?;
     let (selection, mut words) = selected(&reader, &file, job, &names)?;
     let most = (PART / (names.len() + 1)).max(2 * lags);
-    let mut before = Before { file: &file, names: &names, job, lags, rows: 0, tail: Part::default() };
+    let mut before = Before { file: &file, names: &names, job, lags, rows: 0, tail: Tail::default() };
     let mut waiting: Option<Table> = None;
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
@@ -174,7 +221,7 @@ pub(crate) fn in_pieces<T>(
 
 /// Columns, and their times where there is a clock.
 #[derive(Debug, Default)]
-struct Part {
+struct Tail {
     columns: Vec<Vec<f64>>,
     time: Option<Vec<f64>>,
 }
@@ -188,12 +235,12 @@ struct Before<'l> {
     /// How many rows there were.
     rows: usize,
     /// The last of them.
-    tail: Part,
+    tail: Tail,
 }
 
-impl Before<'_> {
+impl<'l> Before<'l> {
     /// The next part, with the rows before it.
-    fn with(&mut self, table: Table) -> Result<Piece, Failure> {
+    fn with(&mut self, table: Table) -> Result<Part<'l>, Failure> {
         let Table { columns, time, start, rows, lines, .. } = table;
         let (file, past) = (self.file, self.tail.columns.first().map_or(0, Vec::len));
         let front = |tail: Option<&Vec<f64>>, values: Vec<f64>| match tail {
@@ -207,24 +254,20 @@ impl Before<'_> {
             .collect();
         let time = time.map(|time| front(self.tail.time.as_ref(), time));
         let last = |values: &Vec<f64>| values[values.len() - self.lags.min(values.len())..].to_vec();
-        self.tail = Part { columns: columns.iter().map(last).collect(), time: time.as_ref().map(last) };
-        // Rows of the part before it have no line here; what a clock says of them it has said before.
-        let row = |row: usize| lines.place(file, row.saturating_sub(past + 1), self.rows);
-        let failed =
-            |error: Error| Failure::about(&error, |found| found.map_or_else(|| file.to_owned(), row));
+        self.tail = Tail { columns: columns.iter().map(last).collect(), time: time.as_ref().map(last) };
         let channels = self.names.iter().cloned().zip(columns);
         let channels = channels.map(|(name, values)| Channel { name, values }).collect();
-        let log = made(channels, time, self.job, Clocks::default()).map_err(failed)?;
+        let recording = Recording { channels, times: times(self.job, time) };
         let (first, end) = (self.rows + 1, self.rows + rows);
         let source = Source {
             file: format!("{file} (rows {first}..{end})"),
-            rows: Rows::new(1, past + rows).map_err(failed)?,
+            rows: Rows::new(1, past + rows).map_err(|error| Failure::data(format!("{file}: {error}")))?,
             time: self.job.clock.column(),
             start,
             resampled: None,
         };
-        self.rows = end;
-        Ok(Piece { log, source, past })
+        let before = std::mem::replace(&mut self.rows, end);
+        Ok(Part { recording, source, past, file, lines, before })
     }
 }
 
@@ -256,12 +299,17 @@ pub(crate) fn record(
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Recorded, Failure> {
     let Columns { channels, table, source, words } = columns(path, job, choose)?;
-    let times = match (&job.clock, table.time) {
+    let times = times(job, table.time);
+    Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
+}
+
+/// When the rows were recorded: one a second without a clock.
+fn times(job: &LogJob, time: Option<Vec<f64>>) -> Times {
+    match (&job.clock, time) {
         (_, Some(time)) => Times::Measured(time),
         (Clock::Fixed(seconds), None) => Times::Uniform(*seconds),
         (_, None) => Times::Uniform(1.0),
-    };
-    Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
+    }
 }
 
 /// Opens a log to be read row by row, as it comes, for the columns that `choose` names. Gives it with what the reader

@@ -1,4 +1,4 @@
-//! `fit --stream`: a log is read once, part by part.
+//! `fit --stream` and `inspect --stream`: a log is read once, part by part.
 
 use serde_json::{Value, json};
 
@@ -14,7 +14,11 @@ fn deviation(one: &Value, other: &Value) -> f64 {
 
 /// A long log, as text: its parts meet at rows 349,526 and 699,051.
 fn long() -> String {
-    let Experiment { u, y, .. } = Experiment::new(ROWS);
+    of(ROWS)
+}
+
+fn of(rows: usize) -> String {
+    let Experiment { u, y, .. } = Experiment::new(rows);
     csv(&[("u", &u), ("y", &y)])
 }
 
@@ -110,5 +114,82 @@ fn what_one_pass_cannot_do_is_refused() {
         assert_eq!(run.code, code, "{line}: {}", run.stderr);
         assert!(run.stderr.contains(why), "{line}: {}", run.stderr);
         assert!(!folder.names().contains(&"model.json".to_owned()), "{line}");
+    }
+}
+
+/// The document of an inspection.
+fn inspected(folder: &Folder, line: &str) -> Value {
+    let run = folder.done(&format!("inspect {line} --format json"));
+    assert_eq!(run.stderr, "");
+    serde_json::from_str(&run.stdout).expect("the document is JSON")
+}
+
+#[test]
+fn an_inspection_of_a_stream_tells_what_the_whole_tells() {
+    // Two parts.
+    let rows = ROWS / 2;
+    let folder = Folder::with_log(of(rows));
+    let whole = inspected(&folder, "log.csv");
+    let stream = inspected(&folder, "log.csv --stream");
+    assert_eq!((&stream["rows"], &stream["log"]), (&json!(rows), &whole["log"]));
+    for channel in 0..2 {
+        let figure = |of: &Value, name: &str| number(of, &format!("/channels/{channel}/{name}"));
+        for name in ["mean", "standard_deviation", "trend"] {
+            let (whole, stream) = (figure(&whole, name), figure(&stream, name));
+            assert!((whole - stream).abs() <= 1e-9 * whole.abs(), "{name}: {whole} {stream}");
+        }
+        for name in ["minimum", "maximum", "repeated", "longest_hold", "outlier_count"] {
+            assert_eq!(figure(&whole, name), figure(&stream, name), "{name}");
+        }
+    }
+    assert_eq!(whole["excitation"][0]["order"], stream["excitation"][0]["order"]);
+    assert_eq!((&stream["delays"][0]["nk"], &whole["delays"][0]["nk"]), (&json!(1), &json!(1)));
+    assert_eq!(stream["command"], whole["command"]);
+    let words = stream["warnings"].to_string();
+    assert!(words.contains("those of the first 100000 rows") && words.contains("is left out"), "{words}");
+    // A pipe gives the same bytes, and the number of threads does not matter.
+    let piped = folder.run_on("inspect - --stream --format json", folder.read("log.csv"));
+    let mut command = folder.command("inspect log.csv --stream --format json");
+    command.env("RAYON_NUM_THREADS", "1");
+    let single = crate::harness::Run::of(command).stdout;
+    assert_eq!(piped.stdout.replace("\"-\"", "\"log.csv\"").replace("fit -", "fit log.csv"), single);
+    assert_eq!(serde_json::from_str::<Value>(&single).ok(), Some(stream));
+}
+
+#[test]
+fn an_inspection_of_one_part_has_the_same_bytes() {
+    let folder = Folder::with_log(plain_log());
+    for line in ["inspect log.csv", "inspect log.csv --format json", "inspect log.csv -u u"] {
+        assert_eq!(folder.done(line).stdout, folder.done(&format!("{line} --stream")).stdout, "{line}");
+    }
+    folder.done("inspect --each log.csv --table each.csv");
+    folder.done("inspect --each log.csv --table stream.csv --stream");
+    assert_eq!(folder.read("each.csv"), folder.read("stream.csv"));
+}
+
+#[test]
+fn a_stream_that_cannot_be_inspected_leaves_nothing() {
+    let folder = Folder::with_log(plain_log());
+    folder.write("word.csv", "u,y\n1,2\n3,4\n5,six\n");
+    folder.write("words.csv", "u,y\na,b\n");
+    folder.write("header.csv", "u,y\n");
+    folder.write("still.csv", "t,u,y\n1,1,2\n1,3,4\n");
+    let mut late = of(ROWS / 2);
+    late.push_str("1,two\n");
+    folder.write("late.csv", late);
+    for (line, code, why) in [
+        ("log.csv --html page.html", 2, "--html"),
+        ("log.csv --time t --resample 0.1:hold", 2, "--resample"),
+        ("word.csv", 3, "word.csv:4:3: column 'y': \"six\""),
+        ("words.csv", 3, "no column holds numbers"),
+        ("header.csv", 3, "no data rows"),
+        ("still.csv --time t", 3, "never advances"),
+        ("late.csv", 3, "late.csv:400002:3: column 'y': \"two\""),
+        ("none.csv", 5, "none.csv"),
+    ] {
+        let run = folder.run(&format!("inspect {line} --stream --format json -o found.json"));
+        assert_eq!(run.code, code, "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(why), "{line}: {}", run.stderr);
+        assert!(!folder.names().contains(&"found.json".to_owned()), "{line}");
     }
 }

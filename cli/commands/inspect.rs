@@ -3,8 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::data::{Recording, Times};
-use thetahat::inspect::{Inspection, InspectionPlan};
+use thetahat::data::{Recording, Source, Times};
+use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
 
@@ -68,23 +68,58 @@ pub(crate) fn inspected(
     job: &InspectJob,
     arguments: &InspectArguments,
 ) -> Result<(Inspection, Option<Recording>), Failure> {
-    let mut chosen = Chosen::default();
-    let Recorded { recording, source, lines, words } = log::record(&job.path, &job.log, |reader| {
-        chosen = Chosen::new(job, reader)
-            .map_err(|message| Failure::data(format!("{}: {message}", job.path.display())))?;
-        Ok(chosen.columns.clone())
-    })?;
-    let resample = match &job.log.clock {
-        Clock::Column { resample, .. } => *resample,
-        Clock::Fixed(_) | Clock::Unknown => None,
+    let (mut inspection, words, kept) = if arguments.stream {
+        let (inspection, words) = in_parts(job)?;
+        (inspection, words, None)
+    } else {
+        whole(job, arguments.html.is_some())?
     };
-    let plan = InspectionPlan { inputs: chosen.inputs, output: chosen.output, resample };
-    let kept = arguments.html.is_some().then(|| recording.clone());
-    let mut inspection =
-        thetahat::inspect::inspect(recording, &source, &plan).map_err(log::at_line(&source.file, &lines))?;
-    inspection.warnings.splice(0..0, words.into_iter().chain(chosen.words));
+    inspection.warnings.splice(0..0, words);
     inspection.command = job.command(arguments, &inspection);
     Ok((inspection, kept))
+}
+
+/// The inspection of a log that is read whole, what the reader should know of how it was read, and what was read, if it is wanted.
+fn whole(job: &InspectJob, keeps: bool) -> Result<(Inspection, Vec<String>, Option<Recording>), Failure> {
+    let mut chosen = Chosen::default();
+    let Recorded { recording, source, lines, mut words } = log::record(&job.path, &job.log, |reader| {
+        chosen = Chosen::new(job, reader)?;
+        Ok(chosen.columns.clone())
+    })?;
+    words.append(&mut chosen.words);
+    let kept = keeps.then(|| recording.clone());
+    let inspection = thetahat::inspect::inspect(recording, &source, &chosen.plan(job))
+        .map_err(log::at_line(&source.file, &lines))?;
+    Ok((inspection, words, kept))
+}
+
+/// The inspection of a log that is read part by part, and what the reader should know of how it was read.
+fn in_parts(job: &InspectJob) -> Result<(Inspection, Vec<String>), Failure> {
+    let file = job.path.display().to_string();
+    let failed = |error| Failure::about(&error, |_| file.clone());
+    let mut inspection: Option<(PiecewiseInspection, Source)> = None;
+    let mut left_out = Vec::new();
+    let choose = |reader: &Reader| {
+        let mut chosen = Chosen::new(job, reader)?;
+        left_out.append(&mut chosen.words);
+        Ok((chosen.columns.clone(), 0, chosen.plan(job)))
+    };
+    let mut words = log::in_parts(&job.path, &job.log, choose, &mut |plan, mut part| {
+        let taken = part.taken();
+        let (sums, source) = match &mut inspection {
+            Some(begun) => begun,
+            none => {
+                let sums = PiecewiseInspection::new(plan.clone()).map_err(failed)?;
+                none.insert((sums, Source { file: file.clone(), ..part.source.clone() }))
+            }
+        };
+        source.rows = part.source.rows;
+        sums.add(taken).map_err(|error| part.failure(&error))
+    })?;
+    words.append(&mut left_out);
+    let (sums, source) =
+        inspection.ok_or_else(|| Failure::data(format!("{file}: there is no row; record at least one")))?;
+    Ok((sums.finish(&source).map_err(failed)?, words))
 }
 
 /// This many columns that are left out for one reason are named.
@@ -102,7 +137,7 @@ struct Chosen {
 
 impl Chosen {
     /// The named columns; without names all that hold numbers. Their roles are those that a fit would give them.
-    fn new(job: &InspectJob, reader: &Reader) -> Result<Self, String> {
+    fn new(job: &InspectJob, reader: &Reader) -> Result<Self, Failure> {
         let mut chosen = Self::default();
         let readable = chosen.readable(job, reader);
         let usual = |name: &str| readable.iter().find(|other| *other == name).cloned();
@@ -122,9 +157,18 @@ impl Chosen {
             readable
         };
         if chosen.columns.is_empty() {
-            return Err(format!("no column holds numbers; there are: {}", log::listed(reader.names())));
+            let (file, names) = (job.path.display(), log::listed(reader.names()));
+            return Err(Failure::data(format!("{file}: no column holds numbers; there are: {names}")));
         }
         Ok(chosen)
+    }
+
+    fn plan(&self, job: &InspectJob) -> InspectionPlan {
+        let resample = match &job.log.clock {
+            Clock::Column { resample, .. } => *resample,
+            Clock::Fixed(_) | Clock::Unknown => None,
+        };
+        InspectionPlan { inputs: self.inputs.clone(), output: self.output.clone(), resample }
     }
 
     /// The columns but the clock that can be read; says which cannot.

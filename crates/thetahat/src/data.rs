@@ -39,7 +39,7 @@ mod tests;
 pub(crate) use digest::{digest, digests, inside, text_digest};
 pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
-pub(crate) use log::{GAP, JITTER, check, measured};
+pub(crate) use log::{GAP, JITTER, Padding, check, measured};
 pub use offset::Offset;
 pub use prefilter::Prefilter;
 pub(crate) use prefilter::Prefiltered;

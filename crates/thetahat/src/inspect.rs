@@ -1,7 +1,7 @@
 //! What a log is worth, before any fit.
 //!
 //! - [`inspect()`] inspects a [`Recording`](crate::data::Recording), [`inspect_log`] at a [`Log`](crate::data::Log); an
-//!   [`InspectionPlan`] names the channels.
+//!   [`InspectionPlan`] names the channels. [`PiecewiseInspection`] takes a log of any length part by part.
 //! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
 //!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output
 //!   ([`Feedback`]).
@@ -27,6 +27,7 @@ mod excitation;
 mod inspection;
 mod moments;
 mod outliers;
+mod pieces;
 mod plan;
 mod quantization;
 mod rest;
@@ -43,6 +44,7 @@ pub(crate) use excitation::{excitation, order_with_mean};
 pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,
 };
+pub use pieces::PiecewiseInspection;
 pub use plan::InspectionPlan;
 pub(crate) use quantization::quantization;
 pub use run::{inspect, inspect_log};

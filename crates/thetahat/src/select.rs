@@ -51,7 +51,7 @@ pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
 pub(crate) use choose::choose;
 pub use choose::choose_orders;
-pub(crate) use delay::delays;
+pub(crate) use delay::{delays, delays_of};
 pub use focus::Focus;
 pub(crate) use processes::{is_step_test, processes};
 pub use selection::{

@@ -73,6 +73,19 @@ pub(crate) struct Padding {
     pub(crate) rows: Rows,
 }
 
+impl Padding {
+    /// Whether the last of some rows, in which all channels repeat one value, are that.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there are more of them than rows.
+    pub(crate) fn of(rows: usize, last: usize) -> Result<Option<Self>, Error> {
+        if last < PADDING.max(rows / 100) || last == rows {
+            return Ok(None);
+        }
+        Ok(Some(Self { rows: Rows::new((rows + 1).saturating_sub(last), rows)? }))
+    }
+}
+
 impl fmt::Display for Padding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let first = self.rows.first();
@@ -391,10 +404,7 @@ impl Log {
             let same = values.iter().rev().take_while(|value| Some(*value) == values.last()).count();
             last = last.min(same);
         }
-        if last < PADDING.max(self.rows / 100) || last == self.rows {
-            return Ok(None);
-        }
-        Ok(Some(Padding { rows: Rows::new(self.rows - last + 1, self.rows)? }))
+        Padding::of(self.rows, last)
     }
 
     /// How many gaps the clock has, not counting where another log begins.

@@ -23,9 +23,13 @@ pub(crate) struct Regular {
 impl Regular {
     /// For times that run forward, with this median step.
     pub(crate) fn of(time: &[f64], median: f64) -> Self {
+        Self::new(time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first), time.len(), median)
+    }
+
+    /// For this many rows over a span of seconds, which run forward, with this median step.
+    pub(crate) fn new(span: f64, recorded: usize, median: f64) -> Self {
         let step = shortest(median, ROUND_STEP * median);
-        let span = time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first);
-        Self { step, rows: (span / step).floor() + 1.0, recorded: time.len() }
+        Self { step, rows: (span / step).floor() + 1.0, recorded }
     }
 
     /// Whether enough of the resampled log was measured.

@@ -4,7 +4,7 @@ use super::{ChannelQuality, moments, outliers, quantization, saturation};
 use crate::data::{Channel, Times};
 
 /// The first rows of outliers that are named.
-const NAMED: usize = 20;
+pub(super) const NAMED: usize = 20;
 
 /// Looks at the values of a channel as they are. O(N log N); up to 32 bytes for each value besides the values themselves.
 pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> ChannelQuality {

@@ -2,7 +2,7 @@
 
 use super::Clock;
 use crate::Error;
-use crate::data::{GAP, JITTER, Times, shortest};
+use crate::data::{GAP, JITTER, Regular, Times, shortest};
 use crate::regression::sum;
 
 /// A clock and what is wrong with it.
@@ -13,6 +13,10 @@ pub(super) struct Ticks {
     pub(super) backward: usize,
     /// The 1-based row of the first of them.
     pub(super) first_backward: Option<usize>,
+    /// Whether the time repeats there.
+    pub(super) repeats: bool,
+    /// The uniform clock that goes with it; none where there is one already.
+    pub(super) regular: Option<Regular>,
 }
 
 impl Ticks {
@@ -33,7 +37,7 @@ impl Ticks {
                     gaps: 0,
                     irregular: false,
                 };
-                return Ok(Self { clock, backward: 0, first_backward: None });
+                return Ok(Self::forward(clock));
             }
             Times::Uniform(step) => {
                 let message = format!("{step} is not a positive number of seconds");
@@ -90,7 +94,14 @@ impl Ticks {
             clock,
             backward: steps.iter().copied().filter(backward).count(),
             first_backward: steps.iter().position(backward).map(|position| position + 2),
+            repeats: steps.iter().find(|step| backward(step)) == Some(&0.0),
+            regular: Some(Regular::of(time, median)),
         })
+    }
+
+    /// A clock that runs forward and is uniform, but for gaps.
+    fn forward(clock: Clock) -> Self {
+        Self { clock, backward: 0, first_backward: None, repeats: false, regular: None }
     }
 }
 
@@ -111,7 +122,7 @@ impl Ticks {
             gaps: 0,
             irregular: false,
         };
-        let mut joined = Self { clock, backward: 0, first_backward: None };
+        let mut joined = Self::forward(clock);
         let (mut square, mut count) = (0.0, 0.0);
         // One row has no step.
         for time in times.filter(|time| time.len() > 1) {

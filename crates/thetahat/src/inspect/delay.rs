@@ -8,7 +8,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::{self, Initial, Kernel, Method};
 use crate::model::Orders;
-use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
+use crate::regression::{Lagged, LaggedMoments, Presample, Taps, sum_of_squares};
 use crate::select::{constant_pays, delays};
 
 /// The highest lag tried.
@@ -61,7 +61,7 @@ pub(super) fn estimate(
 
 /// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(M^3) for M
 /// lags of all of them.
-fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
+pub(super) fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
     let end = record.output.len().min(RESPONSE_ROWS);
     let within = record.segments.iter().map(|segment| segment.start..segment.end.min(end));
     let segments: Vec<Range<usize>> = within.filter(|segment| !segment.is_empty()).collect();
@@ -112,16 +112,7 @@ pub(super) fn correlation(
     output: &[f64],
     segments: &[Range<usize>],
 ) -> DelayEstimate {
-    let mut found = DelayEstimate {
-        input: name.to_owned(),
-        nk: None,
-        confidence: None,
-        correlation: Vec::new(),
-        following: Vec::new(),
-        band: 0.0,
-        impulse_response: Vec::new(),
-        impulse_response_errors: Vec::new(),
-    };
+    let mut found = DelayEstimate::unknown(name);
     let (of_input, of_output) =
         (whitening::autoregression(input, segments), whitening::autoregression(output, segments));
     let left_out = of_input.len().max(of_output.len()) - 1;
@@ -149,6 +140,48 @@ pub(super) fn correlation(
     found.correlation = correlation(&b, &a, 0);
     found.following = correlation(&a, &b, 1);
     found.band = BAND / (count as f64).sqrt();
+    found
+}
+
+/// The same of signals of which the moments are known, as far as their lags reach: with S the sums of products,
+///
+/// ```text
+/// sum a(t - k) b(t) = sum_i sum_j A_u,i A_y,j S[u(t - k - i), y(t - j)]
+/// ```
+pub(super) fn correlation_of(
+    name: &str,
+    moments: &LaggedMoments,
+    input: usize,
+    output: usize,
+) -> DelayEstimate {
+    let mut found = DelayEstimate::unknown(name);
+    let white = |signal: usize| {
+        let highest = whitening::HIGHEST.min(moments.longest() / 2).min(moments.rows() / SAMPLES);
+        let own = [Taps { signal: 0, first: 1, count: highest, sign: -1.0 }];
+        whitening::of_products(moments.normal_equations(&[signal], &own), moments.rows())
+    };
+    let (a, b) = ((input, white(input)), (output, white(output)));
+    let lags = HIGHEST.min(moments.longest() + 1 - a.1.len().max(b.1.len())).min(moments.rows() / SAMPLES);
+    if lags == 0 {
+        return found;
+    }
+    let product = |(early, weights): &(usize, Vec<f64>), lag: usize, (late, others): &(usize, Vec<f64>)| {
+        let inner = |i: usize| -> f64 {
+            let each = others.iter().enumerate();
+            each.map(|(j, other)| other * moments.product((*early, lag + i), (*late, j))).sum()
+        };
+        weights.iter().enumerate().map(|(i, weight)| weight * inner(i)).sum::<f64>()
+    };
+    let (of_input, of_output) = (product(&a, 0, &a), product(&b, 0, &b));
+    let whole = |signal: usize| moments.product((signal, 0), (signal, 0));
+    let known = of_input <= ROUNDING * whole(input) || of_output <= ROUNDING * whole(output);
+    let size = of_input.sqrt() * of_output.sqrt();
+    if known || !size.is_normal() {
+        return found;
+    }
+    found.correlation = (0..=lags).map(|lag| (product(&a, lag, &b) / size).clamp(-1.0, 1.0)).collect();
+    found.following = (1..=lags).map(|lag| (product(&b, lag, &a) / size).clamp(-1.0, 1.0)).collect();
+    found.band = BAND / (moments.rows() as f64).sqrt();
     found
 }
 

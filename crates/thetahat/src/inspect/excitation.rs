@@ -11,14 +11,14 @@ use super::{Excitation, spectrum};
 use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
 /// The highest order tried.
-const HIGHEST: usize = 50;
+pub(super) const HIGHEST: usize = 50;
 /// Samples for each order tried.
 const SAMPLES: usize = 4;
 /// An eigenvalue below this fraction of the largest counts as zero.
 const TOLERANCE: f64 = 1e-6;
 
 /// Of the square of a signal, what is left by another one is rounding below this fraction.
-const SAME: f64 = 1e-20;
+pub(super) const SAME: f64 = 1e-20;
 /// The mean squares of signals that are the same differ by less than this fraction.
 const ALIKE: f64 = 1e-6;
 
@@ -112,7 +112,7 @@ pub(super) fn are_the_same(left: &[f64], right: &[f64], segments: &[Range<usize>
 }
 
 /// The highest order that this many samples tell of: of short segments not too much may be left out.
-fn highest(segments: &[Range<usize>]) -> usize {
+pub(super) fn highest(segments: &[Range<usize>]) -> usize {
     let total = samples(segments);
     let full = |order: usize| -> usize {
         segments.iter().map(|segment| (segment.len() + 1).saturating_sub(order)).sum()
@@ -171,6 +171,11 @@ fn rank(deviations: &[f64], segments: &[Range<usize>], lags: usize, level: Level
         }
         Level::Kept => products[(i, j)] / rows as f64,
     });
+    rank_of(moments)
+}
+
+/// The rank of a matrix of moments.
+pub(super) fn rank_of(moments: DMatrix<f64>) -> usize {
     let eigenvalues = moments.symmetric_eigenvalues();
     let largest = eigenvalues.max();
     eigenvalues.iter().filter(|value| **value > TOLERANCE * largest).count()

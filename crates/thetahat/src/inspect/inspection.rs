@@ -165,6 +165,20 @@ pub struct DelayEstimate {
 }
 
 impl DelayEstimate {
+    /// Of an input of which nothing is known.
+    pub(super) fn unknown(input: &str) -> Self {
+        Self {
+            input: input.to_owned(),
+            nk: None,
+            confidence: None,
+            correlation: Vec::new(),
+            following: Vec::new(),
+            band: 0.0,
+            impulse_response: Vec::new(),
+            impulse_response_errors: Vec::new(),
+        }
+    }
+
     /// Puts the impulse response into other units, if it stays in the range of numbers.
     pub(super) fn scale(&mut self, factor: f64) {
         let all = || self.impulse_response.iter().chain(&self.impulse_response_errors);

@@ -17,6 +17,11 @@ pub(super) fn scale(values: impl Iterator<Item = f64>) -> f64 {
     (-largest.log2().round().clamp(-1000.0, 1000.0)).exp2()
 }
 
+/// Whether a signal of this range is not constant to rounding.
+pub(super) fn moves(minimum: f64, maximum: f64) -> bool {
+    maximum - minimum > ROUNDING * minimum.abs().max(maximum.abs())
+}
+
 /// How many samples some segments have.
 pub(super) fn samples(segments: &[Range<usize>]) -> usize {
     segments.iter().map(Range::len).sum()

@@ -1,16 +1,16 @@
 //! Values far from their neighbours.
 
 /// Values before and after that a value is compared with.
-const HALF: usize = 3;
-const WINDOW: usize = 2 * HALF + 1;
+pub(super) const HALF: usize = 3;
+pub(super) const WINDOW: usize = 2 * HALF + 1;
 /// This many scales away a value is an outlier.
-const THRESHOLD: f64 = 8.0;
+pub(super) const THRESHOLD: f64 = 8.0;
 /// With fewer values there are no neighbours to speak of.
-const FEWEST: usize = 2 * WINDOW;
+pub(super) const FEWEST: usize = 2 * WINDOW;
 /// The fraction of values that are no outliers for sure.
-const ORDINARY: f64 = 0.98;
+pub(super) const ORDINARY: f64 = 0.98;
 /// The size that this many standard normal variables stay below.
-const NORMAL_SIZE: f64 = 2.326_347_874_040_841;
+pub(super) const NORMAL_SIZE: f64 = 2.326_347_874_040_841;
 
 /// The positions of values that lie more than 8 scales off the median of the seven values around them.
 ///
@@ -27,16 +27,15 @@ pub(super) fn outliers(values: &[f64]) -> Vec<usize> {
     if values.len() < FEWEST {
         return Vec::new();
     }
-    let distance = |(position, value): (usize, &f64)| {
+    let of_position = |(position, value): (usize, &f64)| {
         let first = position.saturating_sub(HALF).min(values.len() - WINDOW);
         let mut window = [0.0; WINDOW];
         window.copy_from_slice(&values[first..first + WINDOW]);
-        window.sort_unstable_by(f64::total_cmp);
-        (value - window[HALF]).abs()
+        distance(*value, window)
     };
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
     let change = quantile(&mut changes.collect::<Vec<_>>(), 0.5);
-    let distances: Vec<f64> = values.iter().enumerate().map(distance).collect();
+    let distances: Vec<f64> = values.iter().enumerate().map(of_position).collect();
     let distance = quantile(&mut distances.clone(), ORDINARY) / NORMAL_SIZE;
     let limit = THRESHOLD * distance.max(change);
     let far = |position: usize| distances[position] > limit;
@@ -50,6 +49,12 @@ pub(super) fn outliers(values: &[f64]) -> Vec<usize> {
         outliers.retain(|&position| !range.contains(&values[position]));
     }
     outliers
+}
+
+/// How far a value is from the median of a window.
+pub(super) fn distance(value: f64, mut window: [f64; WINDOW]) -> f64 {
+    window.sort_unstable_by(f64::total_cmp);
+    (value - window[HALF]).abs()
 }
 
 /// The value that a fraction of all values stays below; 0 of none.

@@ -12,6 +12,13 @@ use crate::data::{
 use crate::validate::feedback::feedback;
 use crate::{Document, Error};
 
+/// Why there is nothing to say of the dynamics.
+pub(super) const NO_ROLES: &str =
+    "no column is an input or the output: name them (-u, -y) to learn of excitation, delay and feedback";
+pub(super) const BACKWARD: &str =
+    "excitation, delay and feedback are left out, as the time does not run forward";
+pub(super) const IRREGULAR: &str = "excitation, delay and feedback are left out, as the log is not uniform";
+
 /// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their delays,
 /// and whether they follow the output.
 ///
@@ -119,6 +126,17 @@ fn of_the_rows(
         .par_iter()
         .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), times))
         .collect();
+    described(quality, rows, ticks, source, plan)
+}
+
+/// The document of what there is to say of the rows as they are.
+pub(super) fn described(
+    channels: Vec<ChannelQuality>,
+    rows: usize,
+    ticks: &Ticks,
+    source: &Source,
+    plan: &InspectionPlan,
+) -> Result<Inspection, Error> {
     let mut inspection = Inspection {
         schema: Inspection::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
@@ -126,7 +144,7 @@ fn of_the_rows(
         rows,
         experiments: 1,
         clock: ticks.clock.clone(),
-        channels: quality,
+        channels,
         excitation: Vec::new(),
         delays: Vec::new(),
         feedback: Vec::new(),
@@ -134,12 +152,12 @@ fn of_the_rows(
         command: None,
         warnings: Vec::new(),
     };
-    inspection.warnings = warnings::of_the_rows(&inspection, ticks, times, plan);
+    inspection.warnings = warnings::of_the_rows(&inspection, ticks, plan);
     Ok(inspection)
 }
 
 /// What each channel of the plan is in it. All are there, and have one role.
-fn roles<'a>(
+pub(super) fn roles<'a>(
     channels: &[Channel],
     plan: &'a InspectionPlan,
 ) -> Result<HashMap<&'a str, &'static str>, Error> {
@@ -168,17 +186,14 @@ fn uniform(
 ) -> Result<Result<(Log, Option<Resampling>), String>, Error> {
     channels.retain(|channel| roles.contains_key(channel.name.as_str()));
     if channels.is_empty() {
-        return Ok(Err("no column is an input or the output: name them (-u, -y) to learn of excitation, delay and feedback"
-            .to_owned()));
+        return Ok(Err(NO_ROLES.to_owned()));
     }
     let time = match times {
         Times::Uniform(step) => return Ok(Ok((Log::new(channels, step)?, None))),
         Times::Measured(time) => time,
     };
     if ticks.backward > 0 {
-        return Ok(Err(
-            "excitation, delay and feedback are left out, as the time does not run forward".to_owned()
-        ));
+        return Ok(Err(BACKWARD.to_owned()));
     }
     let asked = plan.resample;
     if asked.is_none() && !ticks.clock.irregular {
@@ -186,7 +201,7 @@ fn uniform(
     }
     let regular = Regular::of(&time, ticks.clock.sample_time);
     if asked.is_none() && !regular.is_worth() {
-        return Ok(Err("excitation, delay and feedback are left out, as the log is not uniform".to_owned()));
+        return Ok(Err(IRREGULAR.to_owned()));
     }
     let how = asked.unwrap_or_else(|| Resample::new(regular.step, Interpolation::Linear));
     let log = Log::resampled(channels, &time, &how)?;

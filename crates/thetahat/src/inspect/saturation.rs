@@ -5,7 +5,7 @@ use super::Saturation;
 /// A limit must have this many rows in runs, for each row of the most frequent value near it.
 const CROWDED: usize = 5;
 /// The values near a limit that it is compared with.
-const NEAR: usize = 8;
+pub(super) const NEAR: usize = 8;
 /// Fewer rows in runs are chance.
 const FEWEST: usize = 5;
 
@@ -40,11 +40,15 @@ pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {
     let rows = |limit: f64, most: usize| {
         // Without the first and the last.
         let inner = runs(values).take(count.saturating_sub(1)).skip(1);
-        let rows: usize = inner.filter(|run| run.value == limit && run.rows > 1).map(|run| run.rows).sum();
-        if rows >= FEWEST && rows > CROWDED * most { rows } else { 0 }
+        crowded(inner.filter(|run| run.value == limit && run.rows > 1).map(|run| run.rows).sum(), most)
     };
     let (lowest, highest) = (sorted.first()?, sorted.last()?);
     let low = rows(*lowest, most(&mut levels().skip(1).take(NEAR)));
     let high = rows(*highest, most(&mut levels().rev().skip(1).take(NEAR)));
     (low + high > 0).then_some(Saturation { low, high })
+}
+
+/// The rows at a limit, if they are more than chance: `most` are those of the most frequent value near it.
+pub(super) fn crowded(rows: usize, most: usize) -> usize {
+    if rows >= FEWEST && rows > CROWDED * most { rows } else { 0 }
 }

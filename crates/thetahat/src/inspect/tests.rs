@@ -12,6 +12,7 @@ use crate::validate::feedback::feedback;
 mod channels;
 mod documents;
 mod dynamics;
+mod pieces;
 
 /// This many normal numbers, to the eye: sums of twelve uniform ones.
 fn normal(seed: u64, count: usize) -> Vec<f64> {

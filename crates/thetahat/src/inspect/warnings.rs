@@ -2,7 +2,6 @@
 
 use super::clock::Ticks;
 use super::{ChannelQuality, Inspection, InspectionPlan};
-use crate::data::{Regular, Times};
 use crate::figures::{fixed, short};
 
 /// A trend that explains this much of an output is worth a warning.
@@ -21,13 +20,8 @@ const UNSURE: f64 = 0.5;
 const FEW_ROWS: usize = 50;
 
 /// What is to be said of the rows as they are.
-pub(super) fn of_the_rows(
-    inspection: &Inspection,
-    ticks: &Ticks,
-    times: &Times,
-    plan: &InspectionPlan,
-) -> Vec<String> {
-    let mut words = clock(inspection, ticks, times, plan);
+pub(super) fn of_the_rows(inspection: &Inspection, ticks: &Ticks, plan: &InspectionPlan) -> Vec<String> {
+    let mut words = clock(inspection, ticks, plan);
     if inspection.rows < FEW_ROWS {
         words.push(format!(
             "the log has {} row{} only: record more",
@@ -41,25 +35,22 @@ pub(super) fn of_the_rows(
     words
 }
 
-fn clock(inspection: &Inspection, ticks: &Ticks, times: &Times, plan: &InspectionPlan) -> Vec<String> {
+fn clock(inspection: &Inspection, ticks: &Ticks, plan: &InspectionPlan) -> Vec<String> {
     let clock = &inspection.clock;
     let mut words = Vec::new();
     if let Some(row) = ticks.first_backward {
-        let how = match times {
-            Times::Measured(time) if time[row - 1] == time[row - 2] => "repeats",
-            _ => "goes back",
-        };
+        let how = if ticks.repeats { "repeats" } else { "goes back" };
         words.push(format!(
             "the time {how} at row {row} ({} such rows): sort the log by time and remove repeated rows",
             ticks.backward
         ));
-    } else if let (true, None, Times::Measured(time)) = (clock.irregular, plan.resample, times) {
+    } else if let (true, None, Some(regular)) = (clock.irregular, plan.resample, ticks.regular) {
         words.push(format!(
             "the clock is irregular (steps from {} s to {} s, median {} s), which a fit does not take: {}",
             short(clock.steps.0),
             short(clock.steps.1),
             short(clock.sample_time),
-            Regular::of(time, clock.sample_time)
+            regular
         ));
     }
     if clock.gaps > 0 && !clock.irregular {

@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
+use thetahat_core::nalgebra::{DMatrix, DVector};
+
 use super::moments::samples;
 use crate::regression::{Lagged, Presample, Taps, add_filtered};
 
 /// The highest order of an autoregression.
-const HIGHEST: usize = 30;
+pub(super) const HIGHEST: usize = 30;
 /// Samples for each order tried.
 const SAMPLES: usize = 10;
 /// Of the square of a signal, what an autoregression leaves is rounding below this fraction.
@@ -27,8 +29,16 @@ pub(crate) fn autoregression(signal: &[f64], segments: &[Range<usize>]) -> Vec<f
     let enough = |count: &usize| 2 * lagged(*count).rows() >= total;
     let highest = (1..=HIGHEST.min(total / SAMPLES)).rev().find(enough).unwrap_or(0);
     let lagged = lagged(highest);
-    let (matrix, right, square) = lagged.normal_equations();
-    let count = lagged.rows().max(1) as f64;
+    of_products(lagged.normal_equations(), lagged.rows())
+}
+
+/// The same for the normal equations of the highest order.
+pub(super) fn of_products(
+    (matrix, right, square): (DMatrix<f64>, DVector<f64>, f64),
+    rows: usize,
+) -> Vec<f64> {
+    let highest = right.len();
+    let count = rows.max(1) as f64;
     let length = |order: usize, left: f64| order as f64 * count.ln() / count + (left / count).ln();
     // L L' = G row by row, and L w = g with it: order k leaves the square less w_1^2 + … + w_k^2.
     let mut rows: Vec<Vec<f64>> = Vec::new();

@@ -11,7 +11,7 @@ use crate::regression::{Presample, sum_of_squares};
 /// At most this many inputs: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;
 /// At least this many samples for each parameter.
-const SAMPLES: usize = 4;
+pub(super) const SAMPLES: usize = 4;
 /// Samples skipped after the maximum lag, so that transients of 1/C die away: they would be tens of times the price of a
 /// parameter.
 const FADING: usize = 50;

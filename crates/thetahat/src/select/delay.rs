@@ -17,7 +17,7 @@
 
 use std::ops::Range;
 
-use super::candidates::{MOST_INPUTS, Samples, are_enough, rows};
+use super::candidates::{MOST_INPUTS, SAMPLES, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
 use super::{Delay, DelayScore, Task};
@@ -26,6 +26,7 @@ use crate::data::Record;
 use crate::estimate::InformationCriterion;
 use crate::figures::fixed;
 use crate::model::Orders;
+use crate::regression::LaggedMoments;
 use crate::validate::feedback;
 
 /// Orders of the models: na, and input lags.
@@ -54,12 +55,22 @@ struct Long {
 /// The lags of each input's B: none where it has no effect. Those of a constant and a trend come last.
 type Windows = Vec<Range<usize>>;
 
+/// What long models are fitted to.
+struct Data<'a> {
+    /// Inputs, those without a name (a constant and a trend) among them.
+    inputs: usize,
+    /// Whether there are enough samples for this many parameters and lags.
+    are_enough: &'a dyn Fn(usize, usize) -> bool,
+    /// The rows of the columns of a model.
+    rows: &'a dyn Fn(&Orders, &Columns) -> Result<Rows, Error>,
+}
+
 impl Long {
-    fn new(record: &Record<'_>, named: usize, na: usize, lags: usize, end: usize) -> Result<Self, Error> {
-        let inputs = record.inputs.len();
+    fn new(data: &Data<'_>, named: usize, na: usize, lags: usize, end: usize) -> Result<Self, Error> {
+        let inputs = data.inputs;
         let largest = Orders::arx(na, &vec![end; named], &vec![0; named])?.with_constants(inputs - named);
         let columns = Columns::new(std::iter::once(&largest), inputs);
-        let rows = rows(record, &columns, &Samples::unknown(record, std::iter::once(&largest)))?;
+        let rows = (data.rows)(&largest, &columns)?;
         let scaled = Scaled::new(&rows);
         Ok(Self { na, lags, end, columns, rows, scaled })
     }
@@ -168,23 +179,61 @@ impl Long {
 /// # Errors
 /// [`Error::Data`] if squares leave the range of numbers.
 pub(crate) fn delays(record: &Record<'_>, names: &[String]) -> Result<Vec<Delay>, Error> {
+    let data = Data {
+        inputs: record.inputs.len(),
+        are_enough: &|parameters, left_out| are_enough(record, parameters, left_out),
+        rows: &|largest, columns| rows(record, columns, &Samples::unknown(record, std::iter::once(largest))),
+    };
+    found_in(&data, names)
+}
+
+/// The same where the moments of all signals are known, of which y is the first of `signals` and the inputs are the others; with a
+/// constant. O(p^3) for p lags of all of them.
+///
+/// # Errors
+/// [`Error::Data`] if squares leave the range of numbers, or have not kept the digits that the comparison needs.
+pub(crate) fn delays_of(
+    moments: &LaggedMoments,
+    signals: &[usize],
+    names: &[String],
+) -> Result<Vec<Delay>, Error> {
+    let data = Data {
+        inputs: names.len(),
+        are_enough: &|parameters, left_out| {
+            left_out <= moments.longest() && moments.rows() >= SAMPLES * parameters
+        },
+        rows: &|_, columns| {
+            let rows = Rows::of_moments(moments, signals, columns);
+            if rows.are_exact() {
+                return Ok(rows);
+            }
+            Err(Error::data(
+                "the sums of squares have too few digits to compare models by: the output has hardly any noise, or changes too slowly for \
+                 its sample time",
+            ))
+        },
+    };
+    found_in(&data, names)
+}
+
+fn found_in(data: &Data<'_>, names: &[String]) -> Result<Vec<Delay>, Error> {
     let inputs = names.len();
     let lags = |order: usize| order * DELAY_LAGS / DELAY_ORDER;
-    let fits = |order: &usize| are_enough(record, order + inputs * lags(*order), (lags(*order)).max(*order));
+    let fits = |order: &usize| (data.are_enough)(order + inputs * lags(*order), (lags(*order)).max(*order));
     let Some(na) = (1..=DELAY_ORDER).rev().find(fits).filter(|_| inputs <= MOST_INPUTS) else {
         return Ok(Vec::new());
     };
     let lags = lags(na);
-    let mut long = Long::new(record, inputs, na, lags, 1 + lags)?;
+    let mut long = Long::new(data, inputs, na, lags, 1 + lags)?;
     // A constant and a trend have one coefficient, whatever the others have.
-    let constants = vec![0..1; record.inputs.len() - inputs];
+    let constants = vec![0..1; data.inputs - inputs];
     let mut windows = long.descend(inputs, [vec![1..1 + lags; inputs], constants].concat())?;
     // A delay in the second half, or no effect: it may be a longer one.
     if windows[..inputs].iter().any(|window| 2 * window.start > lags + 1) {
-        let fits = |end: &usize| are_enough(record, na + inputs * lags, *end);
+        let fits = |end: &usize| (data.are_enough)(na + inputs * lags, *end);
         let end = (2 + lags..=MOST_LAGS).rev().find(fits);
         if let Some(end) = end {
-            long = Long::new(record, inputs, na, lags, end)?;
+            long = Long::new(data, inputs, na, lags, end)?;
             windows = long.descend(inputs, windows)?;
         }
     }

@@ -23,7 +23,7 @@ use super::EXACT;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::regression::{Lagged, Presample, Taps, condition};
+use crate::regression::{Lagged, LaggedMoments, Presample, Taps, condition};
 
 /// Above this condition number the Gram matrix is not exact enough.
 const MAXIMUM_CONDITION: f64 = 1e5;
@@ -122,6 +122,12 @@ impl Rows {
             }
             Kept::Factor => Ok(Self::Factor(lagged.factor().map_err(out_of_range)?)),
         }
+    }
+
+    /// Those of which the moments are known; y is the first of `signals`, which are numbers of theirs.
+    pub(super) fn of_moments(moments: &LaggedMoments, signals: &[usize], columns: &Columns) -> Self {
+        let (matrix, right, square) = moments.normal_equations(signals, &columns.taps());
+        Self::Products(matrix, right, square, moments.rows())
     }
 
     /// How many rows these are.

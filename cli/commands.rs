@@ -33,6 +33,7 @@ mod validate;
 
 pub(crate) use control::designed;
 pub(crate) use design::compared_signals;
+pub use each::Journal;
 pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;

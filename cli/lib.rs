@@ -50,7 +50,7 @@ pub use commands::summary::{
     comparison, control, experiment_design, filtered, inspection, response, step_test, table, tracking,
     tuning, validation,
 };
-pub use commands::{TrackedRow, Tracking, consistency};
+pub use commands::{Journal, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;
 pub use wrap::WIDTH;

@@ -73,7 +73,7 @@ const PYTHON: House = House {
     source: "py/src",
     floors: &[
         &["error"],
-        &["work"],
+        &["journal", "work"],
         &["array"],
         &["grey_box", "log"],
         &["model"],

@@ -16,7 +16,7 @@ use std::thread;
 use rayon::ThreadPoolBuilder;
 use thetahat::{Cell, Document, Row, text};
 
-use self::journal::Journal;
+pub use self::journal::Journal;
 use self::logs::Named;
 use crate::args::EachArguments;
 use crate::failure::{Failure, Kind};
@@ -167,13 +167,13 @@ impl<W: Fn(&Path) -> Result<Done, Failure> + Sync> Run<'_, W> {
 
     /// The row of one log: as it was in the last run, or new.
     fn one(&self, log: &Named) -> Result<Row, Failure> {
+        let path = log.path.display().to_string();
         let digest = self.journal.and_then(|journal| journal.digest(&log.path));
         if let Some((journal, digest)) = self.journal.zip(digest.as_deref())
-            && let Some(row) = journal.row(&log.path, digest)
+            && let Some(row) = journal.row(&path, digest)
         {
             return Ok(row);
         }
-        let path = log.path.display().to_string();
         let mut row = Row::default();
         row.text("log", &path);
         match (self.work)(&log.path) {

@@ -9,9 +9,10 @@ use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::report::{Report, Requirement, Validated};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
-use thetahat::{Cell, Document, is_document};
+use thetahat::{Document, is_document};
 
 use crate::error;
+use crate::journal::{Cells, cells};
 use crate::log::Log;
 use crate::model::Model;
 use crate::work::{awaited, interruptible};
@@ -117,9 +118,15 @@ pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(
     written(py, &found)
 }
 
+/// An inspection that was written: the document, and its table.
+#[pyfunction]
+pub(crate) fn inspection(py: Python<'_>, text: &str) -> PyResult<(String, String)> {
+    written(py, &Inspection::from_json(text).map_err(|error| error::batch(py, error))?)
+}
+
 /// What the document of a fit, a validation or an inspection says in a line of a table of many.
 #[pyfunction]
-pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Vec<(String, Bound<'py, PyAny>)>> {
+pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Cells<'py>> {
     let read = || {
         if is_document::<Inspection>(text) {
             Inspection::from_json(text).map(|inspection| inspection.row())
@@ -130,16 +137,7 @@ pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Vec<(String, Bou
         }
     };
     let row = py.detach(read).map_err(|error| error::batch(py, error))?;
-    let cell = |(name, cell): &(String, Cell)| {
-        let value = match cell {
-            Cell::Flag(flag) => flag.into_pyobject(py)?.to_owned().into_any(),
-            Cell::Count(count) => count.into_pyobject(py)?.into_any(),
-            Cell::Number(number) => number.into_pyobject(py)?.into_any(),
-            Cell::Text(text) => text.into_pyobject(py)?.into_any(),
-        };
-        Ok((name.clone(), value))
-    };
-    row.cells().iter().map(cell).collect()
+    cells(py, &row)
 }
 
 /// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and its table.

@@ -1,7 +1,8 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
 //! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half, `online` the steppers,
-//! `filter` and `track` the steppers behind logs. `array` reads and makes NumPy arrays, `error` is
+//! `filter` and `track` the steppers behind logs. `journal` is what has been done with which of many logs. `array` reads and makes
+//! NumPy arrays, `error` is
 //! the one map of errors, `work` runs what takes long.
 
 mod array;
@@ -11,6 +12,7 @@ mod evaluation;
 mod experiments;
 mod filter;
 mod grey_box;
+mod journal;
 mod log;
 mod model;
 mod normal_equations;
@@ -38,6 +40,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<experiments::Experiments>()?;
     module.add_class::<normal_equations::NormalEquations>()?;
     module.add_class::<evaluation::Validation>()?;
+    module.add_class::<journal::Journal>()?;
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;
     module.add_class::<track::Tracker>()?;
@@ -56,6 +59,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect_file, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::inspection, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::step_test, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::sine_test, module)?)?;

@@ -151,3 +151,109 @@ def test_what_makes_no_sense_is_refused() -> None:
         th.fit_many([MOTOR], threads=0)
     with pytest.raises(ValueError, match="would both be"):
         th.fit_many(["a.csv", "a.csv.gz"], reports="out")
+
+
+def counting(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The logs that are read from now on."""
+    taken: list[str] = []
+
+    def noted(path: str, **options: Any) -> th.Log:
+        taken.append(Path(path).name)
+        return th.read_csv(path, **options)
+
+    monkeypatch.setattr("thetahat._many.read_csv", noted)
+    return taken
+
+
+def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = sorted(folder_of_logs(tmp_path).iterdir(), key=lambda log: (not log.name.startswith("plant"), log.name))
+    out = tmp_path / "out"
+    taken = counting(monkeypatch)
+    # As if it had been interrupted after six logs, two of them broken.
+    th.fit_many(logs[:6], th.arx, na=2, nb=2, reports=out)
+    assert len(taken) == 6
+    fits = th.fit_many(logs, th.arx, na=2, nb=2, reports=out)
+    assert len(taken) == len(logs) and len(set(taken)) == len(logs)
+    whole = th.fit_many(logs, th.arx, na=2, nb=2, reports=tmp_path / "other")
+    assert [row["log"] for row in fits.rows] == [str(log) for log in logs]
+    for row, other in zip(fits.rows, whole.rows):
+        assert {**row, "report": ""} == {**other, "report": ""}
+    assert list(fits) == list(whole) and fits.failures == whole.failures
+    for name in fits.failures:
+        with pytest.raises((ValueError, OSError, th.EstimationError)) as reused:
+            fits[name]
+        with pytest.raises((ValueError, OSError, th.EstimationError)) as new:
+            whole[name]
+        assert reused.type is new.type and str(reused.value) == str(new.value)
+    # What has changed is fitted again, and what has a document that is gone or damaged; nothing else.
+    taken.clear()
+    good = logs[:4]
+    good[0].write_text("\n".join(good[0].read_text().splitlines()[:-1]) + "\n")
+    (out / "plant1.json").unlink()
+    (out / "plant2.json").write_text("{")
+    again = th.fit_many(good, th.arx, na=2, nb=2, reports=out)
+    assert sorted(taken) == ["plant0.csv", "plant1.csv", "plant2.csv"]
+    assert again[1:].rows == fits[1:4].rows
+    # Other arguments are another fit, other threads are not.
+    taken.clear()
+    th.fit_many(good, th.arx, na=2, nb=1, reports=out)
+    th.fit_many(good, th.arx, na=2, nb=1, reports=out, threads=1)
+    assert len(taken) == len(good)
+
+
+def test_what_cannot_be_told_in_words_is_done_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = sorted(folder_of_logs(tmp_path).glob("plant*.csv"))[:2]
+    taken = counting(monkeypatch)
+    for _ in range(2):
+        th.fit_many(logs, lambda log: th.arx(log, na=1, nb=1), reports=tmp_path / "own")
+    assert len(taken) == 4 and not (tmp_path / "own" / "journal.jsonl").exists()
+    # Logs in memory have no digest.
+    for _ in range(2):
+        fits = th.fit_many({"motor": MOTOR}, th.arx, na=2, nb=2, reports=tmp_path / "memory")
+    assert (tmp_path / "memory" / "journal.jsonl").read_text() == "" and fits["motor"].name == "ARX(2, 2, 1)"
+    # An inspection is a document, too.
+    taken.clear()
+    one, other = (th.fit_many(logs, th.inspect, reports=tmp_path / "inspected") for _ in range(2))
+    assert len(taken) == 2 and one.rows == other.rows
+    assert other[0].to_json() == one[0].to_json() and other[0].summary() == one[0].summary()
+
+
+def test_urls_are_known_by_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fsspec = pytest.importorskip("fsspec")
+    memory = fsspec.filesystem("memory")
+    text = "u,y\n" + "".join(f"{u},{y}\n" for u, y in zip(MOTOR["u"], MOTOR["y"]))
+    memory.pipe("/journal/log.csv", text.encode())
+    taken = counting(monkeypatch)
+    url = "memory://journal/log.csv"
+    one, other = (th.fit_many([url], th.arx, na=2, nb=2, reports=tmp_path / "out") for _ in range(2))
+    assert len(taken) == 1 and one.rows == other.rows and one[url] == other[url]
+    memory.pipe("/journal/log.csv", text.replace("2.0", "2.5").encode())
+    th.fit_many([url], th.arx, na=2, nb=2, reports=tmp_path / "out")
+    assert len(taken) == 2
+
+
+def test_a_folder_is_written_by_one_run_at_a_time(tmp_path: Path) -> None:
+    held = _thetahat.Journal(tmp_path / "out", "another")
+    logs = sorted(folder_of_logs(tmp_path).iterdir())[:1]
+    with pytest.raises(OSError, match="another run"):
+        th.fit_many(logs, th.arx, na=2, nb=2, reports=tmp_path / "out")
+    held.close()
+    with pytest.raises(ValueError, match="closed"):
+        held.row("log", "0")
+    th.fit_many(logs, th.arx, na=2, nb=2, reports=tmp_path / "out")
+
+
+def test_the_journal_is_that_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    logs = folder_of_logs(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    by_command_line(tmp_path, "--na", "2", "--nb", "2", "--reports", "out")
+    lines = (tmp_path / "out" / "journal.jsonl").read_text().splitlines()
+    fits = th.fit_many(f"{logs.name}/*.csv", th.arx, na=2, nb=2, reports="out")
+    after = (tmp_path / "out" / "journal.jsonl").read_text().splitlines()
+    assert after[: len(lines)] == lines
+    # Only the digests differ, by the words for what is done.
+    rows = {json.loads(line)["row"][0][1]: json.loads(line)["row"] for line in after[len(lines) :]}
+    assert rows.keys() <= {row["log"] for row in fits.rows}
+    known = {json.loads(line)["row"][0][1]: json.loads(line)["row"] for line in lines}
+    for log, row in rows.items():
+        assert [name for name, _ in row] == [name for name, _ in known[log]]

@@ -23,7 +23,8 @@ const NAME: &str = "journal.jsonl";
 const PIECE: usize = 1 << 18;
 
 /// The journal of a folder; this run has it for itself.
-pub(super) struct Journal {
+#[derive(Debug)]
+pub struct Journal {
     path: PathBuf,
     file: Mutex<File>,
     /// The digests and rows of earlier runs, by log.
@@ -39,11 +40,12 @@ struct Line {
 }
 
 impl Journal {
-    /// That of a folder, which is made if it is not there.
+    /// That of a folder, which is made if it is not there. `common` is what all rows depend on beside their logs, in words that differ
+    /// where it does.
     ///
     /// # Errors
     /// That it cannot be read or written, or that another run has it.
-    pub(super) fn open(folder: &Path, common: &str) -> Result<Self, Failure> {
+    pub fn open(folder: &Path, common: &str) -> Result<Self, Failure> {
         fs::create_dir_all(folder).map_err(|error| Failure::io(folder, "cannot be made", &error))?;
         replace::sweep(folder);
         let path = folder.join(NAME);
@@ -76,7 +78,7 @@ impl Journal {
     }
 
     /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read.
-    pub(super) fn digest(&self, log: &Path) -> Option<String> {
+    pub fn digest(&self, log: &Path) -> Option<String> {
         let mut hasher = XxHash3_128::new();
         hasher.write(self.common.as_bytes());
         hasher.write(&[0]);
@@ -93,8 +95,8 @@ impl Journal {
     }
 
     /// What an earlier run found of a log, if nothing has changed since and its document is still there.
-    pub(super) fn row(&self, log: &Path, digest: &str) -> Option<Row> {
-        let (known, row) = self.known.get(&log.display().to_string())?;
+    pub fn row(&self, log: &str, digest: &str) -> Option<Row> {
+        let (known, row) = self.known.get(log)?;
         let is_there = match row.get("report") {
             Some(Cell::Text(report)) => Path::new(report).is_file(),
             _ => true,
@@ -109,7 +111,7 @@ impl Journal {
     ///
     /// # Errors
     /// That it cannot be written.
-    pub(super) fn note(&self, digest: &str, row: &Row) -> Result<(), Failure> {
+    pub fn note(&self, digest: &str, row: &Row) -> Result<(), Failure> {
         let failed = |error: io::Error| Failure::io(&self.path, "cannot be written", &error);
         let line = Line { digest: digest.to_owned(), row: row.clone() };
         let mut line = serde_json::to_vec(&line).map_err(|error| failed(error.into()))?;

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import glob
+import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Union
 
 from thetahat import _files, _options, _said, _thetahat
+from thetahat._evaluation import Inspection
 from thetahat._fit import search
 from thetahat._log import Log
+from thetahat._model import Model
 from thetahat._read import read_csv
 
 Item = Union[str, "os.PathLike[str]", Log, Any]
 """A log: a file, a `Log`, or a data frame."""
 
 _BETWEEN = " | "
+_NOTED = (0, 3, 4)
+"""The exit codes of what depends on the log alone: not on arguments, nor on whether a file can be read."""
 _ENDINGS = re.compile(r"(\.(gz|csv|tsv|txt|parquet|arrow|feather))+$", re.IGNORECASE)
 
 
@@ -31,18 +37,38 @@ class Work:
     options: Mapping[str, Any] = field(default_factory=dict)
     read: Mapping[str, Any] = field(default_factory=dict)
 
-    def __call__(self, name: str, item: Item, report: str | None = None) -> tuple[dict[str, Any], Any]:
-        """The row of one log, and what was found. The document goes into the file `report`."""
+    def __call__(
+        self, name: str, item: Item, report: str | None = None, journal: _thetahat.Journal | None = None
+    ) -> tuple[dict[str, Any], Any]:
+        """The row of one log, and what was found. The document goes into the file `report`.
+
+        What the journal knows of a file is taken from there, and what it does not know is noted in it.
+        """
+        if journal is None or not isinstance(item, (str, os.PathLike)):
+            return self._new(name, report, lambda: self.log(name, item))
+        with ExitStack() as stack:
+            try:
+                path = stack.enter_context(_files.local(item))
+            except OSError as error:
+                return _failed(name, error), error
+            digest = journal.digest(path)
+            known = None if digest is None else _known(journal.row(name, digest), report)
+            if known is not None:
+                return known
+            row, found = self._new(name, report, lambda: self._of_file(name, item, path))
+        if digest is not None and row["exit_code"] in _NOTED:
+            journal.note(digest, list(row.items()))
+        return row, found
+
+    def _new(self, name: str, report: str | None, log: Callable[[], Log]) -> tuple[dict[str, Any], Any]:
         row: dict[str, Any] = {"log": name, "exit_code": 0}
         with _said.kept() as words:
             try:
-                found = self.fit(self.log(name, item), **self.options)
+                found = self.fit(log(), **self.options)
                 text = found.to_json()
                 figures = _thetahat.row(text)
             except (ValueError, OSError, _thetahat.EstimationError) as error:
-                row["exit_code"] = _exit_code(error)
-                row["message"] = str(error)
-                return row, error
+                return _failed(name, error), error
         for figure, value in figures:
             while figure in row:
                 figure += "_"
@@ -61,15 +87,69 @@ class Work:
             return item
         if isinstance(item, (str, os.PathLike)):
             with _files.local(item) as path:
-                if path == os.fspath(item):
-                    return read_csv(path, **self.read)
-                # What was fetched is called as it is where it came from.
-                try:
-                    log = read_csv(path, **self.read)
-                except (ValueError, OSError) as error:
-                    raise type(error)(str(error).replace(path, name)) from None
-                return Log._of(log._log.called(name), log._clock)
+                return self._of_file(name, item, path)
         return Log.from_dataframe(item, **self.read)
+
+    def _of_file(self, name: str, item: str | os.PathLike[str], path: str) -> Log:
+        if path == os.fspath(item):
+            return read_csv(path, **self.read)
+        # What was fetched is called as it is where it came from.
+        try:
+            log = read_csv(path, **self.read)
+        except (ValueError, OSError) as error:
+            raise type(error)(str(error).replace(path, name)) from None
+        return Log._of(log._log.called(name), log._clock)
+
+    def journal(self, reports: str | os.PathLike[str] | None) -> _thetahat.Journal | None:
+        """The journal of a folder, if what is done can be told in words: by a function of this package, with plain arguments."""
+        if reports is None or _files.is_url(os.fspath(reports)):
+            return None
+        module, function = (str(getattr(self.fit, name, "")) for name in ("__module__", "__qualname__"))
+        if module.split(".")[0] != __package__ or not function.isidentifier():
+            return None
+        try:
+            words = json.dumps([module, function, _plain(self.options), _plain(self.read)])
+        except TypeError:
+            return None
+        return _thetahat.Journal(os.fspath(reports), f"fit_many {words}")
+
+
+def _plain(value: Any) -> Any:
+    """The same as JSON has it. A TypeError for what it does not have."""
+    if isinstance(value, range):
+        return {"range": [value.start, value.stop, value.step]}
+    if isinstance(value, Mapping):
+        return [[_plain(key), _plain(item)] for key, item in value.items()]
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(type(value).__name__)
+
+
+def _known(cells: list[tuple[str, Any]] | None, report: str | None) -> tuple[dict[str, Any], Any] | None:
+    """The row of an earlier run and what was found, if its document can be read still."""
+    if cells is None:
+        return None
+    row = dict(cells)
+    if row["exit_code"] != 0:
+        kind = _thetahat.EstimationError if row["exit_code"] == 4 else ValueError
+        return row, kind(row.get("message", ""))
+    if report is None or row.get("report") != report:
+        return None
+    try:
+        with open(report, encoding="utf-8") as file:
+            text = file.read()
+        kind = json.loads(text)["schema"].split("/")[0]
+        if kind == "thetahat.inspection":
+            return row, Inspection(*_thetahat.inspection(text))
+        return (row, Model.from_json(text)) if kind == "thetahat.report" else None
+    except (OSError, ValueError, KeyError):
+        return None
+
+
+def _failed(name: str, error: Exception) -> dict[str, Any]:
+    return {"log": name, "exit_code": _exit_code(error), "message": str(error)}
 
 
 def _exit_code(error: Exception) -> int:
@@ -178,7 +258,10 @@ def fit_many(
     read : dict, optional
         How files are read (the arguments of `read_csv`), or frames (those of `Log.from_dataframe`).
     reports : path or URL, optional
-        A folder, which is made, for the document of each.
+        A folder, which is made, for the document of each. A later call with the same arguments takes from there what is done with
+        files that have not changed, and goes on where an earlier one was interrupted, as ``thetahat fit --each --reports`` does:
+        ``journal.jsonl`` in it has a digest of each file and of the arguments. Logs in memory and frames are fitted again, and so are all
+        where ``fit`` is a function of your own, an argument is more than numbers, texts and lists of them, or the folder is a URL.
     threads : int, optional
         How many threads to use: as many as there are cores, unless said otherwise.
     **options
@@ -192,6 +275,8 @@ def fit_many(
     ------
     ValueError
         If the arguments do not make sense, whatever the log; if there is no log, or two have one document.
+    OSError
+        If the folder cannot be written, or another run is writing it.
     TypeError
         If ``fit`` has no such argument.
 
@@ -210,16 +295,20 @@ def fit_many(
     files = reports_of([name for name, _ in named], named, reports)
     count = _threads(threads)
     work = Work(fit, options, dict(read or {}))
+    journal = work.journal(reports)
 
     def one(place: int) -> tuple[dict[str, Any], Any]:
         name, item = named[place]
         before = _thetahat.threads(count)
         try:
-            return work(name, item, files[place])
+            return work(name, item, files[place], journal)
         finally:
             _thetahat.threads(before)
 
-    with ThreadPoolExecutor(min(count, len(named))) as pool:
+    with ExitStack() as stack:
+        if journal is not None:
+            stack.callback(journal.close)
+        pool = stack.enter_context(ThreadPoolExecutor(min(count, len(named))))
         futures = [pool.submit(one, place) for place in range(len(named))]
         try:
             outcomes = [future.result() for future in futures]

@@ -21,7 +21,10 @@ use crate::args::{
     ControlArguments, DesignArguments, FitArguments, InspectArguments, MapArgument, TuneArguments,
     ValidateArguments,
 };
-use crate::commands::{Experiments, Tracking, compared_signals, designed, experiments, inspected, settings};
+use crate::commands::{
+    Channels, Experiments, Making, PiecesJob, Tracking, compared_signals, designed, experiments, inspected,
+    settings,
+};
 use crate::failure::Failure;
 use crate::job::{
     DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
@@ -69,6 +72,21 @@ pub fn plan(options: &[OsString], inputs: Vec<String>, output: String) -> Result
         return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
     }
     job.plan(inputs, output)
+}
+
+/// What `thetahat fit --stream` makes of a part of a log with these channels, with these options.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it.
+pub fn pieces(options: &[OsString], inputs: Vec<String>, outputs: Vec<String>) -> Result<Making, Failure> {
+    let log = OsString::from("log");
+    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
+    let job = PiecesJob::resolve(&arguments("fit", &words)?, outputs.len() > 1)?;
+    let inputs = if job.is_driven() { inputs } else { Vec::new() };
+    if inputs.is_empty() && job.is_driven() {
+        return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
+    }
+    job.making(Channels { inputs, outputs }).map(|(_, making)| making)
 }
 
 /// The plan that `thetahat fit --grey` makes of these options.

@@ -34,9 +34,11 @@ mod validate;
 pub(crate) use control::designed;
 pub(crate) use design::compared_signals;
 pub use each::Journal;
-pub(crate) use experiments::{Experiments, experiments};
+pub(crate) use experiments::{Channels, Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;
+pub use pieces::Making;
+pub(crate) use pieces::PiecesJob;
 pub use track::{TrackedRow, Tracking};
 pub(crate) use tune::settings;
 

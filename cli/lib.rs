@@ -41,8 +41,8 @@ use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{
-    Opened, compare_signals, controller_of, equations_plan, inspect, narx_plan, plan, process_plan, read,
-    response_plan, signal_plan, spectrum_plan, state_space_plan, step_test_plan, track, tuning_of,
+    Opened, compare_signals, controller_of, equations_plan, inspect, narx_plan, pieces, plan, process_plan,
+    read, response_plan, signal_plan, spectrum_plan, state_space_plan, step_test_plan, track, tuning_of,
     validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
@@ -50,7 +50,7 @@ pub use commands::summary::{
     comparison, control, experiment_design, filtered, inspection, response, step_test, table, tracking,
     tuning, validation,
 };
-pub use commands::{Journal, TrackedRow, Tracking, consistency};
+pub use commands::{Journal, Making, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;
 pub use wrap::WIDTH;

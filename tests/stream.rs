@@ -77,6 +77,32 @@ fn gaps_clocks_and_several_logs_are_what_they_are() {
 }
 
 #[test]
+fn several_outputs_are_of_one_pass_too() {
+    let folder = Folder::new();
+    let Experiment { u, y, .. } = Experiment::new(300_000);
+    let other: Vec<f64> = y.iter().zip(&u).map(|(y, u)| 20.0 + 0.5 * y + (3.0 * u).sin()).collect();
+    folder.write("log.csv", csv(&[("u", &u), ("y1", &y), ("y2", &other)]));
+    for orders in [
+        "--na 2 --nb 2 --couple full",
+        "--na 1..3 --nb 1..2 --nk 0",
+        "--model arx --na 2 --nb 0 --constant yes",
+    ] {
+        let whole = folder.fit(&format!("log.csv --output y1,y2 {orders}"));
+        let stream = folder.fit(&format!("log.csv --output y1,y2 {orders} --stream"));
+        let gains = |report: &Value| report["model"]["k"].clone();
+        let numbers = |value: &Value| -> Vec<f64> {
+            let rows = value.as_array().into_iter().flatten();
+            rows.flat_map(|row| row.as_array().into_iter().flatten().filter_map(Value::as_f64)).collect()
+        };
+        assert!(distance(&numbers(&gains(&whole)), &numbers(&gains(&stream))) < 1e-11, "{orders}");
+        assert_eq!(stream["estimation"]["samples"], whole["estimation"]["samples"], "{orders}");
+        assert_eq!(stream["fit"].as_array().map(Vec::len), Some(2), "{orders}");
+        let mse = [&whole, &stream].map(|report| number(report, "/estimation/mse"));
+        assert!((mse[0] / mse[1] - 1.0).abs() < 1e-11, "{orders}: {mse:?}");
+    }
+}
+
+#[test]
 fn a_plant_that_rests_for_long_is_no_piece_given_twice() {
     let Experiment { mut u, mut y, .. } = Experiment::new(2000);
     u.resize(ROWS * 2, 3.0);
@@ -98,6 +124,8 @@ fn what_one_pass_cannot_do_is_refused() {
         ("log.csv --na 1..3 --nb 2", 2, "give its orders"),
         ("log.csv --model oe --nb 2 --nf 2", 2, "C, D or F"),
         ("log.csv --model ss --order 2", 2, "--stream is for ARX"),
+        ("other.csv --input u2 --output u1,y --na 1 --nb 1 --nk 1..3", 2, "nk"),
+        ("other.csv --input u2 --output u1,y", 2, "--stream is for ARX"),
         ("log.csv --na 2 --nb 2 --html page.html", 2, "--html"),
         ("log.csv --na 2 --nb 2 --split 60/20/20", 2, "all rows of a piece"),
         ("log.csv --na 2 --nb 2 --detrend linear", 2, "mean or none"),

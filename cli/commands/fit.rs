@@ -11,8 +11,9 @@ use thetahat::report::{
 
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
+use super::pieces::PiecesJob;
 use super::search::{Identified, Telling};
-use super::{grey_box, narx, pieces, process, state_space, stored, summary};
+use super::{grey_box, narx, process, state_space, stored, summary};
 use crate::args::{EachArguments, FitArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
@@ -54,7 +55,7 @@ enum Resolved {
     Process(Box<ProcessJob>),
     StateSpace(Box<StateSpaceJob>),
     /// The logs are read part by part.
-    Pieces(Box<FitJob>),
+    Pieces(PiecesJob),
     Polynomial {
         job: Box<FitJob>,
         /// Whether the log is wanted afterwards.
@@ -73,19 +74,14 @@ fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
     if let Some(job) = ProcessJob::resolve(arguments)? {
         return Ok(Resolved::Process(Box::new(job)));
     }
+    if arguments.stream {
+        return Ok(Resolved::Pieces(PiecesJob::resolve(arguments, false)?));
+    }
     if let Some(job) = StateSpaceJob::resolve(arguments, false)? {
-        if arguments.stream {
-            return Err(Failure::usage(
-                "--stream is for ARX and AR models of one output and impulse responses; fit one output after the other, or leave it out",
-            ));
-        }
         return Ok(Resolved::StateSpace(Box::new(job)));
     }
     let job = FitJob::resolve(arguments)?;
     job.check_output()?;
-    if arguments.stream {
-        return Ok(Resolved::Pieces(Box::new(job)));
-    }
     Ok(Resolved::Polynomial { job: Box::new(job), keeps_log: arguments.html.is_some() })
 }
 
@@ -97,7 +93,7 @@ impl Resolved {
             Self::Narx(job) => narx::found(job, telling),
             Self::Process(job) => process::found(job, telling),
             Self::StateSpace(job) => state_space::found(job, telling),
-            Self::Pieces(job) => pieces::found(job, telling),
+            Self::Pieces(job) => job.found(telling),
             Self::Polynomial { job, keeps_log } => found(job, *keeps_log, telling),
         }
     }

@@ -1,59 +1,150 @@
-//! `thetahat fit --stream`: a linear model of logs of any length, which are read part by part.
+//! `thetahat fit --stream`: a model of logs of any length, which are read part by part.
 
-use thetahat::report::{NormalEquations, Plan};
+use std::path::PathBuf;
+
+use thetahat::Error;
+use thetahat::data::{Log, Source};
+use thetahat::report::NormalEquations;
 use thetahat::select::Choice;
 
-use super::experiments::{Channels, wanted};
+use super::experiments::{Channels, Wanted, wanted};
 use super::search::{Identified, Telling};
+use super::state_space;
+use crate::args::FitArguments;
 use crate::failure::Failure;
-use crate::job::FitJob;
+use crate::job::{FitJob, LogJob, StateSpaceJob};
 use crate::log::{self, Piece};
 
-/// Reads the logs part by part and fits the model. Memory does not grow with their rows.
-pub(super) fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
-    let failed = |error| Failure::about(&error, |_| names(job));
-    let (sum, words) = telling.watched(|_| Ok(summed(job)))?.map_err(failed)??;
-    words.iter().for_each(|word| telling.warn(word));
-    let report = sum.solve().map_err(failed)?;
-    Ok(Identified { report, log: None, sources: Vec::new() })
+/// A model whose normal equations are sums over parts of the logs.
+pub(crate) enum PiecesJob {
+    Linear(Box<FitJob>),
+    /// With several outputs.
+    VectorArx(Box<StateSpaceJob>),
 }
 
-/// The normal equations of all logs, and what the reader should know.
-fn summed(job: &FitJob) -> Result<(NormalEquations, Vec<String>), Failure> {
-    let mut words = Vec::new();
-    let mut sum: Option<NormalEquations> = None;
-    let mut channels: Option<Channels> = None;
-    let mut add = |plan: &Plan, Piece { log, source, past }: Piece| {
-        let sources = [source];
-        let piece = NormalEquations::new(&log, &sources, plan, past).map_err(log::failure(&sources))?;
-        match &mut sum {
-            Some(sum) => sum.merge(&piece).map_err(log::failure(&sources)),
-            None => {
-                sum = Some(piece);
-                Ok(())
-            }
-        }
-    };
-    for path in &job.paths {
-        let choose = |header: &[String]| {
-            let own = Channels::same(&wanted(job), path, header, &mut channels)?;
-            let Choice::Known(orders) = job.orders.of(own.inputs.len())? else {
-                return Err(Failure::usage(
-                    "--stream: one pass over the log makes one model; give its orders, such as --na 2 --nb 2",
-                ));
+/// Makes the normal equations of a part, which begins with so many rows of the one before it.
+pub type Making = Box<dyn Fn(&Log, &[Source], usize) -> Result<NormalEquations, Error> + Send + Sync>;
+
+impl PiecesJob {
+    /// A log that is there already may have several outputs without their names.
+    pub(crate) fn resolve(arguments: &FitArguments, has_several: bool) -> Result<Self, Failure> {
+        if let Some(job) = StateSpaceJob::resolve(arguments, has_several)? {
+            return if job.is_arx() {
+                Ok(Self::VectorArx(Box::new(job)))
+            } else {
+                Err(Failure::usage(
+                    "--stream is for ARX and AR models and impulse responses: the states of a subspace method are evaluated on the log, \
+                     which is not read again; leave it out",
+                ))
             };
-            let names = own.inputs.iter().chain(&own.outputs).cloned().collect();
-            let (inputs, output) = own.single();
-            Ok((names, orders.maximum_lag(), job.plan(inputs, output)?))
-        };
-        words.extend(log::in_pieces(path, &job.log, choose, &mut add)?);
+        }
+        let job = FitJob::resolve(arguments)?;
+        job.check_output()?;
+        Ok(Self::Linear(Box::new(job)))
     }
-    let sum =
-        sum.ok_or_else(|| Failure::data(format!("{}: there is no row; record at least one", names(job))))?;
-    Ok((sum, words))
-}
 
-fn names(job: &FitJob) -> String {
-    let names: Vec<String> = job.paths.iter().map(|path| path.display().to_string()).collect();
-    names.join(", ")
+    fn logs(&self) -> (&[PathBuf], &LogJob) {
+        match self {
+            Self::Linear(job) => (&job.paths, &job.log),
+            Self::VectorArx(job) => (&job.paths, &job.log),
+        }
+    }
+
+    fn wanted(&self) -> Wanted<'_> {
+        match self {
+            Self::Linear(job) => wanted(job),
+            Self::VectorArx(job) => state_space::wanted(job),
+        }
+    }
+
+    /// Whether the model has inputs.
+    pub(crate) fn is_driven(&self) -> bool {
+        self.wanted().driven
+    }
+
+    /// What makes the sums of a part with these columns, and how many rows of the one before it it needs.
+    pub(crate) fn making(&self, channels: Channels) -> Result<(usize, Making), Failure> {
+        Ok(match self {
+            Self::Linear(_) if channels.outputs.len() > 1 => {
+                return Err(Failure::usage(format!(
+                    "--output: there are {}, and the model has one; name it",
+                    channels.outputs.join(", ")
+                )));
+            }
+            Self::Linear(job) => {
+                let (inputs, output) = channels.single();
+                let plan = job.plan(inputs, output)?;
+                let lags = match &plan.choice {
+                    Choice::Known(orders) => orders.maximum_lag(),
+                    Choice::Grid(_) | Choice::Automatic(_) => 0,
+                };
+                (lags, Box::new(move |log, sources, past| NormalEquations::new(log, sources, &plan, past)))
+            }
+            Self::VectorArx(job) => {
+                let plan = job.plan(channels.inputs, channels.outputs)?;
+                let lags = plan.lags();
+                let made = move |log: &Log, sources: &[Source], past| {
+                    NormalEquations::of_states(log, sources, &plan, past)
+                };
+                (lags, Box::new(made))
+            }
+        })
+    }
+
+    /// Whether there is one model to be made.
+    fn check_orders(&self, inputs: usize) -> Result<(), Failure> {
+        match self {
+            Self::Linear(job) if !matches!(job.orders.of(inputs)?, Choice::Known(_)) => Err(Failure::usage(
+                "--stream: one pass over the log makes one model; give its orders, such as --na 2 --nb 2",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    fn names(&self) -> String {
+        let names: Vec<String> = self.logs().0.iter().map(|path| path.display().to_string()).collect();
+        names.join(", ")
+    }
+
+    /// Reads the logs part by part and fits the model. Memory does not grow with their rows.
+    pub(super) fn found(&self, telling: &Telling) -> Result<Identified, Failure> {
+        let failed = |error| Failure::about(&error, |_| self.names());
+        let (sum, words) = telling.watched(|_| Ok(self.summed()))?.map_err(failed)??;
+        words.iter().for_each(|word| telling.warn(word));
+        let report = sum.solve().map_err(failed)?;
+        Ok(Identified { report, log: None, sources: Vec::new() })
+    }
+
+    /// The normal equations of all logs, and what the reader should know.
+    fn summed(&self) -> Result<(NormalEquations, Vec<String>), Failure> {
+        let (paths, job) = self.logs();
+        let mut words = Vec::new();
+        let mut sum: Option<NormalEquations> = None;
+        let mut channels: Option<Channels> = None;
+        let mut add = |making: &Making, Piece { log, source, past }: Piece| {
+            let sources = [source];
+            let piece = making(&log, &sources, past).map_err(log::failure(&sources))?;
+            match &mut sum {
+                Some(sum) => sum.merge(&piece).map_err(log::failure(&sources)),
+                None => {
+                    sum = Some(piece);
+                    Ok(())
+                }
+            }
+        };
+        for path in paths {
+            let choose = |header: &[String]| {
+                let own = Channels::same(&self.wanted(), path, header, &mut channels)?;
+                self.check_orders(own.inputs.len())?;
+                let names = own.inputs.iter().chain(&own.outputs).cloned().collect();
+                let (lags, making) = self.making(own)?;
+                Ok((names, lags, making))
+            };
+            words.extend(log::in_pieces(path, job, choose, &mut add)?);
+        }
+        let sum = sum.ok_or_else(|| {
+            Failure::data(format!("{}: there is no row; record at least one", self.names()))
+        })?;
+        Ok((sum, words))
+    }
 }

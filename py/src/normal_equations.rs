@@ -22,10 +22,10 @@ impl NormalEquations {
     #[new]
     fn new(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>, past: usize) -> PyResult<Self> {
         let log = log.get();
-        let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output()?.clone())
+        let making = thetahat_cli::pieces(&options, log.inputs.clone(), log.outputs.clone())
             .map_err(|failure| error::program(py, &failure))?;
         let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-        let made = interruptible(py, move |_| Sums::new(&channels, &sources, &plan, past))?;
+        let made = interruptible(py, move |_| making(&channels, &sources, past))?;
         Ok(Self(Arc::new(made)))
     }
 
@@ -58,15 +58,21 @@ impl NormalEquations {
         Ok(Model::of(interruptible(py, move |_| own.solve())?))
     }
 
-    /// Structure and orders, such as ARX(2, 2, 1).
+    /// The model and its orders, such as ARX(2, 2, 1).
     fn name(&self) -> String {
-        self.0.orders().to_string()
+        self.0.name()
     }
 
-    /// The channels, the output last.
+    /// The channels, the outputs last.
     #[getter]
     fn channels(&self) -> Vec<&str> {
         self.0.channels()
+    }
+
+    /// How many of them are outputs.
+    #[getter]
+    fn outputs(&self) -> usize {
+        self.0.outputs().len()
     }
 
     #[getter]

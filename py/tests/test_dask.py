@@ -153,6 +153,22 @@ def test_one_model_from_many_pieces(client: Any, tmp_path: Path) -> None:
     assert close(both.solve(), th.arx(th.Log.join(logs), **ORDERS))
 
 
+def test_one_model_of_several_outputs(client: Any) -> None:
+    random = np.random.default_rng(6)
+    u, y = random.standard_normal(1200), np.zeros((1200, 2))
+    for t in range(2, 1200):
+        y[t] = [[0.7, 0.1], [-0.3, 0.5]] @ y[t - 1] + [u[t - 1], 0.5 * u[t - 2]] + 0.1 * random.standard_normal(2)
+    log = th.Log(y + 5, u, sample_time=0.1)
+    orders: dict[str, Any] = {"na": range(1, 3), "nb": range(1, 4), "couple": "full"}
+    pieces = [log[first : first + 100] for first in range(0, 1200, 100)]
+    found, whole = thetahat.dask.normal_equations(pieces, **orders).compute().solve(), th.arx(log, **orders)
+    assert found.samples == whole.samples == 1197
+    for name in ("f", "g", "h", "k", "noise_covariance"):
+        np.testing.assert_allclose(found.document["model"][name], whole.document["model"][name], rtol=1e-11, atol=1e-13)
+    with pytest.raises(ValueError, match="^b: "):
+        thetahat.dask.normal_equations({"a": log[:500], "b": log[500:].select(output="y1")}, **orders).compute()
+
+
 def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
     one, two = MOTOR[:500].to_pandas().reset_index(names="t"), MOTOR[500:].to_pandas().reset_index(names="t")
     read = {"inputs": "u", "output": "y", "time": "t"}

@@ -105,6 +105,60 @@ def test_series_and_impulse_responses(log: th.Log) -> None:
     both(th.fir(log, taps=[20, 8], nk=1, kernel=None), 1e-11, taps=[20, 8], nk=1, kernel=None)
 
 
+@pytest.fixture(scope="module")
+def two() -> th.Log:
+    """Two outputs that follow one another, and two inputs."""
+    random = np.random.default_rng(4)
+    u, e, y = random.standard_normal((2000, 2)), 0.2 * random.standard_normal((2000, 2)), np.zeros((2000, 2))
+    for t in range(3, 2000):
+        y[t] = [[0.8, 0.1], [-0.3, 0.5]] @ y[t - 1] - 0.1 * y[t - 2] + [u[t - 1, 0], 0.5 * u[t - 2, 1]] + e[t]
+    y[[700, 999], [0, 1]] = np.nan
+    return th.Log(y + 50, u, sample_time=0.1)
+
+
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize(
+    "orders",
+    [
+        {"na": 2, "nb": 2},
+        {"na": 2, "nb": [2, 1], "nk": [1, 2], "couple": "none"},
+        {"na": range(1, 4), "nb": range(1, 4), "constant": "yes"},
+        {"na": 1, "nb": 2, "nk": 0, "couple": "full", "offset": {"y1": 50.0}},
+    ],
+)
+def test_several_outputs(two: th.Log, orders: dict[str, Any]) -> None:
+    lags = th.NormalEquations(two[:500], **orders).lags
+    first = th.NormalEquations(two[:1000], **orders)
+    second = th.NormalEquations(two[1000 - lags :], past=lags, **orders)
+    both = pickle.loads(pickle.dumps(first | second))
+    assert both == first | second
+    found, whole = both.solve(), th.arx(two, **orders)
+    for matrix in ("a", "b"):
+        values = [np.ravel([[[q["value"], q["standard_error"] or 0] for q in row] for row in one]) for one in
+                  found.document["estimation"][matrix] + whole.document["estimation"][matrix]]
+        half = len(values) // 2
+        np.testing.assert_allclose(np.concatenate(values[:half]), np.concatenate(values[half:]), rtol=1e-12, atol=1e-13)
+    covariances = [model.document["model"]["noise_covariance"] for model in (found, whole)]
+    np.testing.assert_allclose(*covariances, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found.simulate(np.ones((50, 2))), whole.simulate(np.ones((50, 2))), rtol=1e-10)
+    assert [fit["output"] for fit in found.fits] == ["y1", "y2"] and found.samples == whole.samples
+    assert repr(both).endswith("2000 rows in 2 pieces, inputs u1, u2, outputs y1, y2)")
+
+
+def test_several_outputs_without_inputs(two: th.Log) -> None:
+    sums = th.NormalEquations(two, na=2)
+    assert repr(sums) == "NormalEquations(ARX(2) with 2 outputs, 2000 rows in 1 piece, no inputs, outputs y1, y2)"
+    assert sums.solve().inputs == []
+    with pytest.raises(ValueError, match="taps: an impulse response has one output"):
+        th.NormalEquations(two, taps=5)
+    with pytest.raises(ValueError, match="couple: it is for logs with several outputs"):
+        th.NormalEquations(two.select(output="y1"), 2, 2, couple="full")
+    with pytest.raises(ValueError, match="nk: the rows of a model change with its delay"):
+        th.NormalEquations(two, 2, 2, range(1, 3))
+    with pytest.raises(ValueError, match="of ARX.2, 2, .1 1.. with 2 outputs, the second ones of ARX.1"):
+        th.NormalEquations(two[:999], 2, 2).merge(th.NormalEquations(two[999:], 1, 2))
+
+
 @pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
 def test_they_travel(log: th.Log) -> None:
     pieces = cut(log, [0, 1000, 2000, 3000])

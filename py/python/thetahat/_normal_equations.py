@@ -9,7 +9,7 @@ from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import FitOptions, Orders
+from thetahat._options import FitOptions, Order, Orders
 
 
 class NormalEquations:
@@ -23,12 +23,15 @@ class NormalEquations:
     order of time, they are compared with the rows that came before. Experiments have a past of 0. Missing samples, and gaps of the clock,
     are gaps as in any log.
 
+    Of a log with several outputs the model is that of `thetahat.arx` with polynomials of matrices. Its orders may be ranges: the sums are
+    the normal equations of each, and the least MDL chooses when they are solved.
+
     Parameters
     ----------
     log : Log
         The piece: its past, and the rows of its own.
     na : int, default 0
-        Coefficients of A: past outputs.
+        Coefficients of A: past outputs; with several outputs a range too.
     nb : int, or one for each input, optional
         Coefficients of B. Without it the inputs of the log are left out.
     nk : int, or one for each input, optional
@@ -39,6 +42,8 @@ class NormalEquations:
         In place of na and nb: how many values the impulse response of a finite one has.
     kernel : {"dc", "tc"} or None, default "dc"
         What is known of that response, see `fir`.
+    couple : {"full", "none", "auto"}, optional
+        With several outputs: whether an output depends on the past of all or of its own, see `arx`.
     detrend : {"mean", "none"}, optional
         What is taken from each channel: its mean over all pieces, unless said otherwise.
     offset : dict of str to float, optional
@@ -81,18 +86,24 @@ class NormalEquations:
     def __init__(
         self,
         log: Log,
-        na: int | None = None,
+        na: Order | None = None,
         nb: Orders | None = None,
         nk: Orders | None = None,
         *,
         past: int = 0,
         taps: int | Sequence[int] | None = None,
         kernel: str | None = "dc",
+        couple: str | None = None,
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
         constant: str | None = None,
     ) -> None:
         data = handle("log", log)
+        several = len(log.outputs) > 1
+        if taps is not None and several:
+            raise ValueError(f"taps: an impulse response has one output, and the log {len(log.outputs)}; take it with log.select(output=...)")
+        if couple is not None and not several:
+            raise ValueError("couple: it is for logs with several outputs; leave it out")
         if taps is not None:
             if na is not None or nb is not None:
                 raise ValueError("taps: an impulse response has neither na nor nb; leave them out, or give no taps")
@@ -103,10 +114,11 @@ class NormalEquations:
         elif nb is None:
             if nk is not None:
                 raise ValueError("nk: it is for inputs; give nb too, or leave it out")
-            words = ["--model=ar", *_options.order_words(na=na)]
+            words = ["--model=arx", *_options.order_words(na=na, nb=0)] if several else ["--model=ar", *_options.order_words(na=na)]
         else:
             orders = _options.order_words(na=0 if na is None else na, nb=nb, nk=1 if nk is None else nk)
             words = ["--model=arx", *orders]
+        words += [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
         words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
         if _options.integer("past", past) < 0:
             raise ValueError(f"past: {past} is below 0")
@@ -206,7 +218,9 @@ class NormalEquations:
         return self
 
     def __repr__(self) -> str:
-        *inputs, output = self._sums.channels
+        channels, first = self._sums.channels, len(self._sums.channels) - self._sums.outputs
+        inputs, outputs = channels[:first], channels[first:]
         driven = f"inputs {', '.join(inputs)}" if inputs else "no inputs"
+        driven += f", output{'' if len(outputs) == 1 else 's'} {', '.join(outputs)}"
         pieces = f"{self.pieces} piece{'' if self.pieces == 1 else 's'}"
-        return f"NormalEquations({self._sums.name()}, {self.rows} rows in {pieces}, {driven}, output {output})"
+        return f"NormalEquations({self._sums.name()}, {self.rows} rows in {pieces}, {driven})"

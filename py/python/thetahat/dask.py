@@ -373,13 +373,17 @@ def _shared() -> Iterator[None]:
         _thetahat.threads(before)
 
 
-def _lags(
-    na: int = 0, nb: int | Sequence[int] = 0, nk: int | Sequence[int] | None = None, taps: int | Sequence[int] | None = None, **_: Any
-) -> int:
-    """How many rows the model reaches back to, at most."""
-    first = (0 if taps is not None else 1) if nk is None else int(numpy.max(nk))
-    count = int(numpy.max(nb if taps is None else taps))
-    return max(na or 0, first + count - 1 if count else 0)
+def _lags(na: Any = 0, nb: Any = 0, nk: Any = None, taps: Any = None, **_: Any) -> int:
+    """How many rows the model reaches back to, at most. Orders are numbers, ranges, or one of these for each input."""
+    first = (0 if taps is not None else 1) if nk is None else _largest(nk)
+    count = _largest(nb if taps is None else taps)
+    return max(_largest(na), first + count - 1 if count else 0)
+
+
+def _largest(order: Any) -> int:
+    if isinstance(order, (range, list, tuple, numpy.ndarray)):
+        return max(map(_largest, order), default=0)
+    return 0 if order is None else int(order)
 
 
 def _loaded(work: _many.Work, name: str, item: Any) -> Log:

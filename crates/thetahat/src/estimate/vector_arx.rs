@@ -1,5 +1,6 @@
 //! ARX models with several outputs, by least squares from one Gram matrix.
 
+mod sums;
 #[cfg(test)]
 mod tests;
 
@@ -16,6 +17,7 @@ use super::subspace::{Factor, LaggedProducts, ROUNDING, divided, log_determinant
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{Entry, EntryCovariance, Quantity, StateSpace, StateSpaceMatrix, lag_name};
+pub(crate) use sums::{joint_products, joint_taps, vector_arx_of_sums};
 
 /// More models of more coefficients are not compared: these are a minute or two.
 const MOST_WORK: f64 = 2e12;
@@ -72,7 +74,7 @@ impl FromStr for Coupling {
 }
 
 /// Among which ARX models with several outputs the least MDL chooses.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct VectorArxOptions {
     /// How many past samples of the outputs there are.
     pub na: RangeInclusive<usize>,
@@ -89,7 +91,8 @@ pub struct VectorArxOptions {
 }
 
 /// How many past samples of its inputs an ARX model has.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum VectorArxInputs {
     /// As many of each, among these.
     Alike(RangeInclusive<usize>),
@@ -187,13 +190,32 @@ pub(crate) fn vector_arx(
     options: &VectorArxOptions,
     sample_time: f64,
 ) -> Result<VectorArxEstimate, Error> {
-    let models = options.models(record.inputs.len());
+    let products = |delay: usize, longest: usize| {
+        let later = record.clone().delayed(&vec![delay; record.inputs.len()]);
+        let products = LaggedProducts::new(&later, longest, options.constant);
+        products.ok_or_else(|| super::subspace::silent(&later, longest))
+    };
+    let samples =
+        |longest: usize| record.segments.iter().map(|segment| segment.len().saturating_sub(longest)).sum();
+    of_products(products, samples, (record.inputs.len(), record.outputs.len()), options, sample_time)
+}
+
+/// The same where `products` gives those of so many lags of a record whose inputs are so many samples late, and `samples` how many of them
+/// have so many lags, of so many inputs and outputs.
+fn of_products(
+    products: impl Fn(usize, usize) -> Result<LaggedProducts, Error>,
+    samples: impl Fn(usize) -> usize,
+    (inputs, outputs): (usize, usize),
+    options: &VectorArxOptions,
+    sample_time: f64,
+) -> Result<VectorArxEstimate, Error> {
+    let models = options.models(inputs);
     if models.is_empty() {
         return Err(Error::argument("na", "the models have no coefficients; ask for one at least"));
     }
-    let longest = models.iter().map(|model| model.lags(options.direct)).max().unwrap_or(0);
-    let samples: usize = record.segments.iter().map(|segment| segment.len().saturating_sub(longest)).sum();
-    let most = models.iter().map(|model| model.regressors(record.outputs.len())).max().unwrap_or(0);
+    let longest = options.longest(inputs);
+    let samples = samples(longest);
+    let most = models.iter().map(|model| model.regressors(outputs)).max().unwrap_or(0);
     if samples <= most + 1 {
         return Err(Error::undetermined(
             Vec::new(),
@@ -213,15 +235,14 @@ pub(crate) fn vector_arx(
             ),
         ));
     }
-    let products = LaggedProducts::new(record, longest, options.constant)
-        .ok_or_else(|| super::subspace::silent(record, longest))?;
+    let compared = products(0, longest)?;
     let mut best: Option<(Solved, Orders)> = None;
     let mut tried = Vec::new();
     let mut refusal = None;
     let solved: Vec<(Orders, Result<Solved, Error>)> = models
         .into_par_iter()
         .map(|orders| {
-            let solved = Solved::new(&products, &orders, options.direct);
+            let solved = Solved::new(&compared, &orders, options.direct);
             (orders, solved)
         })
         .collect();
@@ -247,15 +268,12 @@ pub(crate) fn vector_arx(
     }
     let (delay, mdl) = (orders.delay, solved.mdl);
     if delay == 0 {
-        return Ok(solved.estimate(&products, &orders, options, (sample_time, tried)));
+        return Ok(solved.estimate(&compared, &orders, options, (sample_time, tried)));
     }
-    let later = record.clone().delayed(&vec![delay; record.inputs.len()]);
     let orders = Orders { delay: 0, ..orders };
-    let longest = orders.lags(options.direct);
-    let products = LaggedProducts::new(&later, longest, options.constant)
-        .ok_or_else(|| super::subspace::silent(&later, longest))?;
-    let solved = Solved::new(&products, &orders, options.direct)?;
-    let mut estimate = solved.estimate(&products, &orders, options, (sample_time, tried));
+    let later = products(delay, orders.lags(options.direct))?;
+    let solved = Solved::new(&later, &orders, options.direct)?;
+    let mut estimate = solved.estimate(&later, &orders, options, (sample_time, tried));
     estimate.outcome.nk.iter_mut().for_each(|nk| *nk += delay);
     Ok(VectorArxEstimate { delay, mdl, ..estimate })
 }
@@ -285,6 +303,18 @@ impl Orders {
 }
 
 impl VectorArxOptions {
+    /// The longest lag of all models with so many inputs.
+    pub(crate) fn longest(&self, inputs: usize) -> usize {
+        let most = match &self.nb {
+            VectorArxInputs::Alike(range) if inputs > 0 => *range.end(),
+            VectorArxInputs::Alike(_) => 0,
+            VectorArxInputs::Each(each) => each.iter().copied().max().unwrap_or(0),
+        };
+        let first = self.delay.end().saturating_add(usize::from(!self.direct));
+        let of_inputs = most.checked_sub(1).map_or(0, |later| first.saturating_add(later));
+        of_inputs.max(*self.na.end())
+    }
+
     fn models(&self, inputs: usize) -> Vec<Orders> {
         let nb: Vec<Vec<usize>> = match &self.nb {
             VectorArxInputs::Alike(range) if inputs > 0 => range.clone().map(|nb| vec![nb; inputs]).collect(),

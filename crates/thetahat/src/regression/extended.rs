@@ -172,9 +172,30 @@ impl ExtendedGram {
 
     /// The sum of the squares of a column about its mean.
     pub(crate) fn spread(&self, column: usize) -> f64 {
-        let sum = self.entry(0, column);
-        let level = sum * sum / fx128::from_f64(self.rows as f64);
-        self.entry(column, column).sub_accurate(level).0.max(0.0)
+        self.about_means(column, column).0.max(0.0)
+    }
+
+    /// The sum of the products of two columns, less their means.
+    fn about_means(&self, one: usize, other: usize) -> fx128 {
+        let (one, other) = (one.min(other), one.max(other));
+        let level = self.entry(0, one) * self.entry(0, other) / fx128::from_f64(self.rows as f64);
+        self.entry(one, other).sub_accurate(level)
+    }
+
+    /// The means of the products of some columns; if `centred`, of their deviations from their means, and these.
+    pub(crate) fn mean_products(
+        &self,
+        columns: &[Column],
+        centred: bool,
+    ) -> (DMatrix<f64>, Option<DVector<f64>>) {
+        let (size, rows) = (columns.len(), fx128::from_f64(self.rows as f64));
+        let entry = |(one, s): Column, (other, t): Column| {
+            let sum = if centred { self.about_means(one, other) } else { self.entry(one, other) };
+            s * t * (sum / rows).0
+        };
+        let products = DMatrix::from_fn(size, size, |row, column| entry(columns[row], columns[column]));
+        let mean = |(place, sign): Column| sign * (self.entry(0, place) / rows).0;
+        (products, centred.then(|| DVector::from_fn(size, |row, _| mean(columns[row]))))
     }
 
     /// The regression of a target on some columns: Cholesky, R' R = G, with the target last.

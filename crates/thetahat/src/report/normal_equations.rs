@@ -1,31 +1,32 @@
 //! One model from many pieces of the data.
 
 mod border;
+mod linear;
+mod settings;
 #[cfg(test)]
 mod tests;
+mod totals;
+mod vector_arx;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
-use faer::fx128;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
-use super::fitted_rows::estimation_start;
-use super::identify::{ROUNDING, channels, constant, estimation_of, estimation_rows};
+use super::identify::{channels, estimation_rows};
 use super::schema::{Data, Missing, Report};
-use super::warnings::warnings;
-use crate::data::{Detrend, Log, Offset, Rows, Source, digests};
-use crate::estimate::{
-    Constant, Fitted, Initial, Kernel, LinearProblem, Method, lagged_products, out_of_range, taps,
-};
-use crate::model::{Orders, Signal};
-use crate::regression::{ExtendedGram, extended_sum};
-use crate::respond::Horizon;
-use crate::select::Choice;
+use super::state_space::StateSpacePlan;
+use crate::data::{Log, Record, Rows, Source, digests};
+use crate::estimate::{joint_products, joint_taps, lagged_products};
+use crate::regression::ExtendedGram;
+use crate::respond::{Horizon, InitialCondition};
 use crate::validate::{Fit, Part};
 use crate::{Document, Error};
 use border::Border;
+use settings::{Kind, Settings};
+use totals::Totals;
 
 /// The normal equations of a model that is linear in its parameters: made from a piece of the data, added to those of other pieces,
 /// solved at the end. The JSON document `thetahat.normal-equations/1`.
@@ -96,49 +97,19 @@ pub struct NormalEquations {
     border: Border,
 }
 
-/// What all pieces have in common.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-struct Settings {
-    inputs: Vec<String>,
-    output: String,
-    orders: Orders,
-    /// `mean` or `none`.
-    detrend: String,
-    /// Channels whose offset is set by hand.
-    offsets: Vec<(String, f64)>,
-    constant: Constant,
-    /// That of a regularised impulse response.
-    kernel: Option<Kernel>,
+/// A part of the data, of which the first `past` rows are of the part before it.
+struct Piece<'l> {
+    log: &'l Log,
+    sources: &'l [Source],
+    past: usize,
+    /// The rows of its own.
+    own: Vec<Rows>,
 }
 
-/// What is known of the values of a channel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-struct Totals {
-    /// Samples that count for the mean; none of the past.
-    rows: usize,
-    /// Their sum, and what that number lacks.
-    sum: [f64; 2],
-    /// The least and the largest of them; none where there is none.
-    range: Option<[f64; 2]>,
-    missing: usize,
-}
-
-impl NormalEquations {
-    /// Those of a piece of the data, of which the first `past` rows are of the piece before it.
-    ///
-    /// The plan says inputs, output, orders, offsets and constant as for [`identify`](super::identify()); it gives the method too, the
-    /// default or [`Method::Regularised`].
-    ///
-    /// # Errors
-    /// [`Error::Argument`] for a plan that asks for more than least squares on all rows, and a past that is shorter than
-    /// [`lags`](Self::lags) or is the whole piece; [`Error::Data`] for a channel that is not there, and if squares leave the range of
-    /// numbers.
-    pub fn new(log: &Log, sources: &[Source], plan: &Plan, past: usize) -> Result<Self, Error> {
-        let settings = Settings::of(plan)?;
-        let names = channels(log, plan)?;
+impl<'l> Piece<'l> {
+    /// Of a model that reaches back to so many rows.
+    fn new(log: &'l Log, sources: &'l [Source], past: usize, lags: usize) -> Result<Self, Error> {
         log.check_uniform()?;
-        let (orders, rows) = (&settings.orders, log.rows());
-        let lags = orders.maximum_lag();
         if past > 0 && past < lags {
             return Err(Error::argument(
                 "past",
@@ -148,6 +119,7 @@ impl NormalEquations {
                 ),
             ));
         }
+        let rows = log.rows();
         if past >= rows {
             return Err(Error::argument(
                 "past",
@@ -156,39 +128,101 @@ impl NormalEquations {
                 ),
             ));
         }
-        let estimation = vec![Rows::new(past + 1, rows)?];
-        let segments = log.segments(&names, &estimation)?;
-        let record = estimation_rows(log, plan, orders, &estimation)?;
+        Ok(Self { log, sources, past, own: vec![Rows::new(past + 1, rows)?] })
+    }
+
+    /// The rows of its own in which all channels have a value, each segment with as many such rows before it as `lags`.
+    fn with_past(record: &Record<'_>, lags: usize) -> Vec<Range<usize>> {
+        let each = record.segments.iter().zip(&record.past);
+        each.map(|(rows, past)| rows.start - lags.min(*past)..rows.end).collect()
+    }
+}
+
+impl NormalEquations {
+    /// Those of a piece of the data, of which the first `past` rows are of the piece before it.
+    ///
+    /// The plan says inputs, output, orders, offsets and constant as for [`identify`](super::identify()); it gives the method too, the
+    /// default or [`Method::Regularised`](crate::estimate::Method::Regularised).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a plan that asks for more than least squares on all rows, and a past that is shorter than
+    /// [`lags`](Self::lags) or is the whole piece; [`Error::Data`] for a channel that is not there, and if squares leave the range of
+    /// numbers.
+    pub fn new(log: &Log, sources: &[Source], plan: &Plan, past: usize) -> Result<Self, Error> {
+        let settings = Settings::of(plan)?;
+        let Kind::Linear { orders, .. } = &settings.kind else {
+            return Err(Error::argument("orders", "they are not those of a model with one output"));
+        };
+        let names = channels(log, plan)?;
+        let piece = Piece::new(log, sources, past, settings.lags())?;
+        let measured = log.segments(&names, &piece.own)?;
+        let record = estimation_rows(log, plan, orders, &piece.own)?;
         let products = lagged_products(&record, orders)?;
-        let totals = names.iter().map(|name| {
-            let values = &log.channel(name)?.values;
-            let own = if *name == plan.output { &segments } else { &record.segments };
-            let sums = own.iter().map(|rows| extended_sum(&values[rows.clone()]));
-            let sum = sums.fold(fx128::ZERO, fx128::add_accurate);
-            let each = || own.iter().flat_map(|rows| &values[rows.clone()]).copied();
-            let range = each().fold(None, |range: Option<[f64; 2]>, value| {
-                let [least, largest] = range.unwrap_or([value; 2]);
-                Some([least.min(value), largest.max(value)])
-            });
-            let missing = values[past..].iter().filter(|value| value.is_nan()).count();
-            Ok(Totals { rows: own.iter().map(|rows| rows.len()).sum(), sum: [sum.0, sum.1], range, missing })
+        Self::made(settings, &piece, products, (&record.segments, &measured))
+    }
+
+    /// Those of an ARX model with several outputs.
+    ///
+    /// The plan says the channels, [`arx`](StateSpacePlan::arx), delays, offsets and constant as for
+    /// [`fit_state_space`](super::fit_state_space()). Products of all lags of all signals are the normal equations of every order: orders and
+    /// coupling may be ranges, of which the least MDL chooses when the model is solved for.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new); [`Error::Argument`] for a plan without `arx`, and a range of delays, whose models are of other rows.
+    pub fn of_states(
+        log: &Log,
+        sources: &[Source],
+        plan: &StateSpacePlan,
+        past: usize,
+    ) -> Result<Self, Error> {
+        let settings = Settings::of_states(plan)?;
+        let Kind::VectorArx { outputs, delays, arx } = &settings.kind else {
+            return Err(Error::argument("arx", "the plan is of another model"));
+        };
+        let piece = Piece::new(log, sources, past, settings.lags())?;
+        let [first, others @ ..] = outputs.as_slice() else {
+            return Err(Error::argument("output", "there is none; name at least one"));
+        };
+        // Whatever is measured has to be there.
+        let read: Vec<String> = others.iter().chain(&settings.inputs).cloned().collect();
+        let record = log.record(&read, first, &piece.own)?;
+        let signals: Vec<&[f64]> =
+            std::iter::once(record.output).chain(record.inputs.iter().copied()).collect();
+        let taps = joint_taps(delays, outputs.len(), arx.longest(delays.len()));
+        let segments = Piece::with_past(&record, settings.lags());
+        let products = joint_products(&signals, taps, &segments)?;
+        Self::made(settings, &piece, products, (&record.segments, &record.segments))
+    }
+
+    /// Of a piece in which the samples of these segments count for the offsets of inputs, and of outputs.
+    fn made(
+        settings: Settings,
+        piece: &Piece<'_>,
+        products: ExtendedGram,
+        (of_inputs, of_outputs): (&[Range<usize>], &[Range<usize>]),
+    ) -> Result<Self, Error> {
+        let Piece { log, sources, past, ref own } = *piece;
+        let names = settings.names();
+        let totals = names.iter().enumerate().map(|(channel, name)| {
+            let segments = if channel < settings.inputs.len() { of_inputs } else { of_outputs };
+            Ok(Totals::of(&log.channel(name)?.values, past, segments))
         });
         Ok(Self {
             schema: Self::SCHEMA.to_owned(),
             sample_time: log.sample_time(),
             products,
             channels: totals.collect::<Result<_, Error>>()?,
-            rows,
-            segments: record.segments.iter().map(Rows::from_positions).collect(),
+            rows: log.rows(),
+            segments: of_inputs.iter().map(Rows::from_positions).collect(),
             time_gaps: log
                 .segment_starts()
                 .iter()
                 .filter(|start| **start >= past && !log.boundaries().contains(start))
                 .count(),
             logs: sources.to_vec(),
-            digests: digests(log, &names, &estimation)?,
-            border: Border::new(log, &names, past, lags)?,
-            estimation,
+            digests: digests(log, &names, own)?,
+            border: Border::new(log, &names, past, settings.lags())?,
+            estimation: own.clone(),
             settings,
         })
     }
@@ -227,7 +261,7 @@ impl NormalEquations {
                 "a piece is given twice: {called} of the second ones is among the first ones already; merge each piece once"
             )));
         }
-        let lags = self.settings.orders.maximum_lag();
+        let lags = self.lags();
         let border = self.border.joined(&other.border, lags, &self.settings.names())?;
         let rows = self.rows.checked_add(other.rows).ok_or_else(|| Error::data("there are too many rows"))?;
         let later = |more: &[Rows]| -> Result<Vec<Rows>, Error> {
@@ -255,80 +289,18 @@ impl NormalEquations {
     /// The model, with the figures that need no second pass over the data: of its fit, that one step ahead on the rows of the fit.
     ///
     /// # Errors
-    /// As for [`identify`](super::identify()): [`Error::Undetermined`] if the data cannot determine the parameters, which are named.
+    /// As for [`identify`](super::identify()) and [`fit_state_space`](super::fit_state_space()): [`Error::Undetermined`] if the data cannot
+    /// determine the parameters, which are named.
     pub fn solve(&self) -> Result<Report, Error> {
-        let Settings { inputs, output, orders, kernel, .. } = &self.settings;
-        let names = self.settings.names();
-        let offsets =
-            (0..names.len()).map(|channel| self.offset(channel)).collect::<Result<Vec<_>, Error>>()?;
-        // y is the first signal of a regression.
-        let (taken, of_inputs) = offsets.split_last().ok_or_else(|| Error::data("there is no output"))?;
-        let of_signals: Vec<f64> = std::iter::once(taken).chain(of_inputs).copied().collect();
-        let products = self.products.less(&taps(orders), &of_signals);
-        if !products.is_in_range() {
-            return Err(out_of_range());
+        match &self.settings.kind {
+            Kind::Linear { orders, kernel, .. } => linear::solve(self, orders, *kernel),
+            Kind::VectorArx { delays, arx, .. } => vector_arx::solve(self, delays, arx),
         }
-        let problem = LinearProblem { orders, sample_time: self.sample_time, kernel: *kernel, products };
-        let mut fitted = problem.fit(self.settings.constant)?;
-        if fitted.offset.is_none() && self.settings.takes_output_offset() {
-            fitted.open = problem.left_open(&fitted.estimate);
-        }
-        let Fitted { estimate, offset, open, .. } = &fitted;
-        let level = |level: f64| Offset { level, slope: 0.0 };
-        let signal = |(name, offset): (&String, &f64)| Signal { name: name.clone(), offset: level(*offset) };
-        let found = offset.map_or(0.0, |found| found.offset.level);
-        let signals = inputs.iter().zip(of_inputs).map(signal).collect();
-        let mut model = estimate.to_model(orders, self.sample_time, signals, signal((output, taken)))?;
-        model.offset_covariance.clone_from(open);
-        model.output.offset.level = taken + found;
-        let missing = names.iter().zip(&self.channels);
-        let mut report = Report {
-            schema: Report::SCHEMA.to_owned(),
-            generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-            data: Data {
-                logs: self.logs.clone(),
-                digests: self.digests.clone(),
-                rows: self.rows,
-                sample_time: self.sample_time,
-                detrend: self.settings.detrend.clone(),
-                prefilter: None,
-                estimation: self.estimation.clone(),
-                validation: Vec::new(),
-                split: None,
-                segments: self.segments.clone(),
-                missing: missing
-                    .map(|(name, totals)| Missing { channel: (*name).to_owned(), rows: totals.missing })
-                    .collect(),
-                time_gaps: self.time_gaps,
-            },
-            selection: None,
-            estimation: estimation_of(&fitted, level(*taken)),
-            fit: Vec::new(),
-            warnings: Vec::new(),
-            model: model.clone().into(),
-        };
-        report.warnings = warnings(&report, &model);
-        let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
-        let (samples, mse) = (fitted.estimate.samples(), fitted.estimate.mse());
-        report.fit.push(Fit {
-            output: output.clone(),
-            rows: self.estimation.clone(),
-            part: Some(Part::Estimation),
-            horizon: Horizon::Steps { steps: 1 },
-            initial: estimation_start(&report, &model),
-            samples,
-            percent: finite(100.0 * (1.0 - (mse * samples as f64).sqrt() / problem.output_spread())),
-            rmse: finite(mse.sqrt()),
-            mean_absolute_error: None,
-            largest_error: None,
-            outside: None,
-        });
-        Ok(report)
     }
 
     /// How many rows a piece has to begin with that are of the piece before it: as many as the model reaches back to.
     pub fn lags(&self) -> usize {
-        self.settings.orders.maximum_lag()
+        self.settings.lags()
     }
 
     /// The rows of all pieces, without those of the past.
@@ -346,43 +318,78 @@ impl NormalEquations {
         self.estimation.len()
     }
 
-    /// The orders of the model.
-    pub fn orders(&self) -> &Orders {
-        &self.settings.orders
+    /// The model and its orders, such as ARX(2, 2, 1).
+    pub fn name(&self) -> String {
+        self.settings.kind.to_string()
     }
 
-    /// The names of the channels, the output last.
+    /// The names of the outputs.
+    pub fn outputs(&self) -> &[String] {
+        self.settings.outputs()
+    }
+
+    /// The names of the channels, the outputs last.
     pub fn channels(&self) -> Vec<&str> {
         self.settings.names()
     }
 
+    /// The least and the largest value of a channel.
+    fn range(&self, channel: usize) -> Result<[f64; 2], Error> {
+        self.channels[channel].range.ok_or_else(|| {
+            Error::data("no row of the pieces has a value in every channel; give other pieces or channels")
+        })
+    }
+
     /// What is taken from a channel.
     fn offset(&self, channel: usize) -> Result<f64, Error> {
-        let (names, totals) = (self.settings.names(), &self.channels[channel]);
-        let name = names[channel];
-        let Some([least, largest]) = totals.range else {
-            return Err(Error::data(
-                "no row of the pieces has a value in every channel; give other pieces or channels",
-            ));
-        };
-        let [sum, rest] = totals.sum;
-        let by_hand = self.settings.offsets.iter().find(|(channel, _)| channel == name);
-        let level = match by_hand {
-            Some((_, level)) => *level,
-            None if self.settings.detrend == Detrend::None.to_string() => 0.0,
-            None => {
-                let sum = fx128::from_f64(sum).add_accurate(fx128::from_f64(rest));
-                (sum / fx128::from_f64(totals.rows as f64)).0
-            }
-        };
-        let orders = &self.settings.orders;
-        let input = (channel < orders.inputs()).then_some(channel);
-        let used = input.is_none_or(|input| orders.nb[input] > 0);
-        let size = |least: f64, largest: f64| least.abs().max(largest.abs());
-        if used && size(least - level, largest - level) <= ROUNDING * size(least, largest) {
-            return Err(constant(name, input, Some(orders), false));
+        self.range(channel)?;
+        let told = self.settings.told_offset(self.settings.names()[channel]);
+        Ok(told.unwrap_or_else(|| self.channels[channel].mean()))
+    }
+
+    /// What the model is fitted to.
+    fn data(&self) -> Data {
+        let missing = self.settings.names().into_iter().zip(&self.channels);
+        Data {
+            logs: self.logs.clone(),
+            digests: self.digests.clone(),
+            rows: self.rows,
+            sample_time: self.sample_time,
+            detrend: self.settings.detrend.clone(),
+            prefilter: None,
+            estimation: self.estimation.clone(),
+            validation: Vec::new(),
+            split: None,
+            segments: self.segments.clone(),
+            missing: missing
+                .map(|(name, totals)| Missing { channel: name.to_owned(), rows: totals.missing })
+                .collect(),
+            time_gaps: self.time_gaps,
         }
-        Ok(level)
+    }
+
+    /// The figures one step ahead of an output with this norm about its mean, of errors with this mean square.
+    fn one_step(
+        &self,
+        output: &str,
+        (samples, mse): (usize, f64),
+        spread: f64,
+        initial: InitialCondition,
+    ) -> Fit {
+        let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
+        Fit {
+            output: output.to_owned(),
+            rows: self.estimation.clone(),
+            part: Some(Part::Estimation),
+            horizon: Horizon::ONE_STEP,
+            initial,
+            samples,
+            percent: finite(100.0 * (1.0 - (mse * samples as f64).sqrt() / spread)),
+            rmse: finite(mse.sqrt()),
+            mean_absolute_error: None,
+            largest_error: None,
+            outside: None,
+        }
     }
 }
 
@@ -392,138 +399,19 @@ impl Document for NormalEquations {
     const REMEDY: &'static str = "give one that a piece was made into";
 
     fn check(&self) -> Result<(), Error> {
-        let Settings { inputs, orders, detrend, offsets, .. } = &self.settings;
-        // What indexes anything is checked here.
-        let Orders { na, nb, nc, nd, nf, nk } = orders;
-        let fits = Orders::new(*na, nb, *nc, *nd, nf, nk).is_ok()
-            && orders.is_linear()
-            && orders.inputs() == inputs.len()
-            // One and y(t) beside the regressors.
-            && self.products.size() == orders.parameters() + 2
-            && self.channels.len() == inputs.len() + 1
-            && self.channels.iter().all(|totals| totals.sum.iter().all(|value| value.is_finite()))
+        let channels = self.settings.names().len();
+        let fits = self.settings.fits(self.products.size())
+            && self.channels.len() == channels
+            && self.channels.iter().all(Totals::is_finite)
             && self.sample_time.is_finite()
             && self.sample_time > 0.0
             && !self.estimation.is_empty()
             && self.estimation.iter().chain(&self.segments).all(|rows| rows.last() <= self.rows)
-            && matches!(detrend.parse(), Ok(Detrend::Mean | Detrend::None))
-            && offsets.iter().all(|(_, level)| level.is_finite())
-            && self.border.fits(inputs.len() + 1);
+            && self.border.fits(channels);
         if fits {
             Ok(())
         } else {
             Err(Error::report("the parts of these normal equations do not fit together; make them again"))
         }
-    }
-}
-
-impl Totals {
-    fn add(&mut self, other: &Self) {
-        let whole = |[sum, rest]: [f64; 2]| fx128::from_f64(sum).add_accurate(fx128::from_f64(rest));
-        let sum = whole(self.sum).add_accurate(whole(other.sum));
-        self.sum = [sum.0, sum.1];
-        self.rows += other.rows;
-        self.missing += other.missing;
-        self.range = match (self.range, other.range) {
-            (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
-            (own, more) => own.or(more),
-        };
-    }
-}
-
-impl Settings {
-    fn of(plan: &Plan) -> Result<Self, Error> {
-        plan.check()?;
-        let Choice::Known(orders) = &plan.choice else {
-            return Err(Error::argument("orders", "pieces of a log make one model; give its orders"));
-        };
-        if !orders.is_linear() {
-            return Err(Error::argument(
-                "orders",
-                "a model with C, D or F is found by a search, which reads the data again and again; from pieces come models with A and B",
-            ));
-        }
-        let kernel = match plan.method {
-            Method::PredictionError(_) => None,
-            Method::Regularised(kernel) => Some(kernel),
-            _ => {
-                return Err(Error::argument(
-                    "method",
-                    "normal equations give least squares; leave the other method or criterion out",
-                ));
-            }
-        };
-        let parts = !(plan.estimate.is_empty() && plan.validate.is_empty()) || plan.split.is_some();
-        let refused = [
-            (
-                parts,
-                "rows",
-                "all rows of a piece serve for the fit; cut the pieces, and validate the model on other ones",
-            ),
-            (
-                plan.prefilter.is_some(),
-                "prefilter",
-                "a filter reaches over the borders of pieces; filter the signals before",
-            ),
-            (
-                plan.trend,
-                "trend",
-                "pieces have no common line; leave it out, or take the trend from the signals before",
-            ),
-            (
-                matches!(plan.initial, Initial::Zero | Initial::Estimate),
-                "initial",
-                "rows without a full regressor are left out; give drop, or leave it out",
-            ),
-            (
-                !matches!(plan.detrend, Detrend::Mean | Detrend::None),
-                "detrend",
-                "what is taken from the channels of all pieces is their mean or nothing; give mean or none",
-            ),
-        ];
-        if let Some((_, argument, message)) = refused.into_iter().find(|(refused, _, _)| *refused) {
-            return Err(Error::argument(argument, message));
-        }
-        Ok(Self {
-            inputs: plan.inputs.clone(),
-            output: plan.output.clone(),
-            orders: orders.clone(),
-            detrend: plan.detrend.to_string(),
-            offsets: plan.offsets.clone(),
-            constant: plan.constant(),
-            kernel,
-        })
-    }
-
-    fn names(&self) -> Vec<&str> {
-        self.inputs.iter().chain([&self.output]).map(String::as_str).collect()
-    }
-
-    fn takes_output_offset(&self) -> bool {
-        self.detrend != Detrend::None.to_string()
-            && !self.offsets.iter().any(|(name, _)| *name == self.output)
-    }
-
-    fn check_same(&self, other: &Self) -> Result<(), Error> {
-        let differ = |message: String| Err(Error::argument("pieces", message));
-        if self.names() != other.names() {
-            return differ(format!(
-                "the first ones have the channels {}, the second ones {}; make all of the same",
-                self.names().join(", "),
-                other.names().join(", ")
-            ));
-        }
-        if self.orders != other.orders {
-            return differ(format!(
-                "the first ones are of {}, the second ones of {}; make all with the same orders",
-                self.orders, other.orders
-            ));
-        }
-        if self != other {
-            return differ(
-                "they were made with other offsets, another constant, or another kernel; make all with the same settings".to_owned(),
-            );
-        }
-        Ok(())
     }
 }

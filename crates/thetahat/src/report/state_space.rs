@@ -8,7 +8,7 @@ mod warnings;
 use std::ops::{ControlFlow, RangeInclusive};
 
 use super::pending::{Open, PendingEvaluation};
-use super::schema::{Estimation, Report};
+use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
@@ -17,6 +17,7 @@ use crate::optimize::{Monitor, Search};
 use crate::regression::{SAFE_NORMS, largest};
 use crate::{Document, Error};
 use estimated::Estimated;
+pub(super) use estimated::of_arx;
 
 /// Which state-space model to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,7 +143,20 @@ impl StateSpacePlan {
         Ok(())
     }
 
-    fn channels(&self) -> impl Iterator<Item = &str> {
+    /// How many rows before a row an ARX model reads; none of another one, whose states have no finite past.
+    pub fn lags(&self) -> usize {
+        let late = self.delays.iter().copied().max().unwrap_or(0);
+        self.arx.as_ref().map_or(0, |arx| late.saturating_add(arx.longest(self.inputs.len())))
+    }
+
+    /// Levels that are given are not estimated unless that is asked for.
+    pub(super) fn resolved_constant(&self) -> Constant {
+        let by_hand = self.offsets.iter().any(|(name, _)| self.outputs.contains(name));
+        let given = self.detrend == Detrend::None || by_hand;
+        if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
+    }
+
+    pub(super) fn channels(&self) -> impl Iterator<Item = &str> {
         self.inputs.iter().chain(&self.outputs).map(String::as_str)
     }
 }
@@ -254,13 +268,7 @@ fn fit(
         let mut rows = segments.iter().cloned().flatten();
         let first = rows.next().map(|row| values[row]);
         if rows.all(|row| Some(values[row]) == first) {
-            return Err(Error::undetermined(
-                Vec::new(),
-                format!(
-                    "'{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes, or leave \
-                     it out"
-                ),
-            ));
+            return Err(is_constant(name));
         }
         let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
         let offset = match by_hand {
@@ -270,7 +278,7 @@ fn fit(
         Ok(Signal { name: name.clone(), offset })
     };
     let inputs = plan.inputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
-    let mut outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
+    let outputs = plan.outputs.iter().map(signal).collect::<Result<Vec<_>, Error>>()?;
     let signals = inputs.iter().chain(&outputs).map(|signal| (signal.name.as_str(), signal.offset));
     let deviations = log.deviations(signals)?;
     for name in &names {
@@ -283,7 +291,7 @@ fn fit(
         }
     }
 
-    let mut delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
+    let delays = if plan.delays.is_empty() { vec![0; inputs.len()] } else { plan.delays.clone() };
     let record = deviations.joint_record(&plan.inputs, &plan.outputs, &shares.estimation)?.delayed(&delays);
     if record.segments.is_empty() {
         return Err(Error::undetermined(
@@ -291,13 +299,23 @@ fn fit(
             "no segment is longer than the delays of the inputs (`nk`): lower them, or give more rows",
         ));
     }
-    let given =
-        plan.detrend == Detrend::None || plan.offsets.iter().any(|(name, _)| plan.outputs.contains(name));
-    let constant = if plan.constant == Constant::Auto && given { Constant::No } else { plan.constant };
+    let constant = plan.resolved_constant();
     let found = match &plan.arx {
         Some(arx) => estimated::by_arx(&record, (arx, &delays), constant, log)?,
         None => estimated::by_subspace(&record, plan, constant, (log, monitor))?,
     };
+    let segments = segments.iter().map(Rows::from_positions).collect();
+    let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
+    reported(found, (inputs, outputs), delays, data)
+}
+
+/// The report of what was found, without the figures of its fit, and the model.
+pub(super) fn reported(
+    found: Estimated,
+    (inputs, mut outputs): (Vec<Signal>, Vec<Signal>),
+    mut delays: Vec<usize>,
+    data: Data,
+) -> Result<(Report, StateSpaceModel), Error> {
     let Estimated {
         matrices,
         levels,
@@ -321,8 +339,6 @@ fn fit(
     }
     model.check()?;
 
-    let segments = segments.iter().map(Rows::from_positions).collect();
-    let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
     let estimation = Estimation {
         procedure,
         initial: Some(Initial::Estimate),
@@ -348,4 +364,14 @@ fn fit(
         fit: Vec::new(),
     };
     Ok((report, model))
+}
+
+/// A channel that does not change.
+pub(super) fn is_constant(name: &str) -> Error {
+    Error::undetermined(
+        Vec::new(),
+        format!(
+            "'{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes, or leave it out"
+        ),
+    )
 }

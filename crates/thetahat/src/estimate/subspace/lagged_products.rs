@@ -147,7 +147,16 @@ impl LaggedProducts {
     /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
     pub(in crate::estimate) fn new(record: &JointRecord<'_>, past: usize, constant: bool) -> Option<Self> {
         let (products, samples, means) = mean_products(record, past, constant);
-        let (inputs, outputs) = (record.inputs.len(), record.outputs.len());
+        Self::scaled((record.inputs.len(), record.outputs.len()), past, samples, (products, means))
+    }
+
+    /// The same of the mean products of so many inputs and outputs, and their means where these were taken off.
+    pub(in crate::estimate) fn scaled(
+        (inputs, outputs): (usize, usize),
+        past: usize,
+        samples: usize,
+        (products, means): (DMatrix<f64>, Option<DVector<f64>>),
+    ) -> Option<Self> {
         let scales: Vec<f64> =
             (0..inputs + outputs).map(|signal| products[(signal, signal)].sqrt()).collect();
         if !scales.iter().all(|scale| crate::regression::SAFE_NORMS.contains(scale)) {

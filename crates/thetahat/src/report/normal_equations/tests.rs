@@ -1,9 +1,13 @@
 //! One model from pieces is that of the whole log.
 
+mod vector_arx;
+
 use super::*;
-use crate::data::Channel;
-use crate::model::OffsetCovariance;
+use crate::data::{Channel, Detrend};
+use crate::estimate::{Constant, Initial, Kernel, Method};
+use crate::model::{OffsetCovariance, Orders};
 use crate::report::identify;
+use crate::select::Choice;
 
 /// Numbers in -1 … 1.
 fn noise(count: usize, seed: u32) -> Vec<f64> {
@@ -38,13 +42,18 @@ fn plan() -> Plan {
 /// The rows from one border to the next, each piece with the past that it needs.
 fn pieces(log: &Log, plan: &Plan, borders: &[usize]) -> Vec<NormalEquations> {
     let Choice::Known(orders) = &plan.choice else { panic!("orders are given") };
-    let piece = |pair: &[usize]| {
-        let past = orders.maximum_lag().min(pair[0]);
-        let names: Vec<&str> = log.channels().iter().map(|channel| channel.name.as_str()).collect();
-        let part = log.part(&names, Rows::new(pair[0] - past + 1, pair[1]).unwrap()).unwrap();
-        NormalEquations::new(&part, &[], plan, past).unwrap()
+    let made = |part: &Log, past: usize| NormalEquations::new(part, &[], plan, past).unwrap();
+    parts(log, orders.maximum_lag(), borders).iter().map(|(part, past)| made(part, *past)).collect()
+}
+
+/// The rows from one border to the next, with those before them that a model reaches back to, and how many these are.
+fn parts(log: &Log, lags: usize, borders: &[usize]) -> Vec<(Log, usize)> {
+    let names: Vec<&str> = log.channels().iter().map(|channel| channel.name.as_str()).collect();
+    let part = |pair: &[usize]| {
+        let past = lags.min(pair[0]);
+        (log.part(&names, Rows::new(pair[0] - past + 1, pair[1]).unwrap()).unwrap(), past)
     };
-    borders.windows(2).map(piece).collect()
+    borders.windows(2).map(part).collect()
 }
 
 fn merged(pieces: &[NormalEquations]) -> NormalEquations {

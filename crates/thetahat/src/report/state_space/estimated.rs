@@ -9,8 +9,8 @@ use crate::Error;
 use crate::data::{JointRecord, Log};
 use crate::estimate::{
     Constant, Ordered, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace, SubspaceOptions,
-    SubspaceOutcome, VectorArxOptions, Weighting, products_of_innovations, refined, subspace, vector_arx,
-    with_levels,
+    SubspaceOutcome, VectorArxEstimate, VectorArxOptions, Weighting, products_of_innovations, refined,
+    subspace, vector_arx, with_levels,
 };
 use crate::model::{EntryCovariance, StateSpace};
 use crate::optimize::Monitor;
@@ -19,23 +19,23 @@ use crate::optimize::Monitor;
 const MOST_VALUES: usize = 40;
 
 /// What was estimated from a record.
-pub(super) struct Estimated {
-    pub(super) matrices: StateSpace,
-    pub(super) levels: Vec<f64>,
+pub(in crate::report) struct Estimated {
+    pub(in crate::report) matrices: StateSpace,
+    pub(in crate::report) levels: Vec<f64>,
     /// Whether these were estimated.
-    pub(super) has_levels: bool,
-    pub(super) covariance: Option<EntryCovariance>,
-    pub(super) procedure: Procedure,
+    pub(in crate::report) has_levels: bool,
+    pub(in crate::report) covariance: Option<EntryCovariance>,
+    pub(in crate::report) procedure: Procedure,
     /// The free parameters, and the degrees of freedom of the errors.
-    pub(super) free: usize,
-    pub(super) degrees: usize,
+    pub(in crate::report) free: usize,
+    pub(in crate::report) degrees: usize,
     /// The samples that have errors, and the mean products of these.
-    pub(super) samples: usize,
-    pub(super) mean: DMatrix<f64>,
+    pub(in crate::report) samples: usize,
+    pub(in crate::report) mean: DMatrix<f64>,
     /// By how many samples more than asked all inputs are late.
-    pub(super) delay: usize,
+    pub(in crate::report) delay: usize,
     /// The orders that the data offered to choose among.
-    pub(super) offered: RangeInclusive<usize>,
+    pub(in crate::report) offered: RangeInclusive<usize>,
 }
 
 /// N - p/l; a search for starts counts their states in p.
@@ -75,21 +75,37 @@ pub(super) fn by_arx(
     log: &Log,
 ) -> Result<Estimated, Error> {
     let find = |constant: bool| {
-        let found = vector_arx(record, &VectorArxOptions { constant, ..options.clone() }, log.sample_time())?;
+        vector_arx(record, &VectorArxOptions { constant, ..options.clone() }, log.sample_time())
+    };
+    let exact = |found: &VectorArxEstimate| {
+        // What lagged products cannot tell from nothing.
+        let record = record.clone().delayed(&vec![found.delay; delays.len()]);
+        let products = products_of_innovations(&found.space, &record, &found.levels)
+            .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+        let all = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
+        Ok(products / all as f64)
+    };
+    of_arx(find, exact, delays, constant)
+}
+
+/// The same that `find` finds with a constant or without, whose errors `exact` says where products of signals do not tell them from none.
+pub(in crate::report) fn of_arx(
+    find: impl Fn(bool) -> Result<VectorArxEstimate, Error>,
+    exact: impl Fn(&VectorArxEstimate) -> Result<DMatrix<f64>, Error>,
+    delays: &[usize],
+    constant: Constant,
+) -> Result<Estimated, Error> {
+    let find = |constant: bool| {
+        let found = find(constant)?;
         if found.levels.iter().all(|level| level.is_finite()) { Ok(found) } else { Err(integrates()) }
     };
     let mut found = with_levels(constant, find, |found| found.mdl)?;
     found.outcome.nk.iter_mut().zip(delays).for_each(|(nk, delay)| *nk += delay);
     let (samples, mut mean) = (found.samples, found.space.noise_covariance.clone());
     if mean.diagonal().iter().any(|variance| *variance == 0.0) {
-        // What lagged products cannot tell from nothing.
-        let record = record.clone().delayed(&vec![found.delay; delays.len()]);
-        let products = products_of_innovations(&found.space, &record, &found.levels)
-            .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
-        let all = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
-        mean = products / all as f64;
+        mean = exact(&found)?;
     }
-    let degrees = degrees("the model", found.free_parameters, samples, record.outputs.len())?;
+    let degrees = degrees("the model", found.free_parameters, samples, mean.nrows())?;
     Ok(Estimated {
         matrices: with_noise(found.space, &mean, samples, degrees),
         levels: found.levels,

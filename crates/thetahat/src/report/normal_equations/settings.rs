@@ -1,0 +1,259 @@
+//! What all pieces of a model have in common.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::super::state_space::StateSpacePlan;
+use super::Plan;
+use crate::Error;
+use crate::data::{Detrend, Rows, Split};
+use crate::estimate::{Constant, Initial, Kernel, Method, VectorArxInputs, VectorArxOptions};
+use crate::model::Orders;
+use crate::select::Choice;
+
+/// More rows than any model reaches back to.
+const MOST_LAGS: usize = 100_000;
+
+/// A model, and what is taken from its channels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(super) struct Settings {
+    pub(super) inputs: Vec<String>,
+    #[serde(flatten)]
+    pub(super) kind: Kind,
+    /// `mean` or `none`.
+    pub(super) detrend: String,
+    /// Channels whose offset is set by hand.
+    pub(super) offsets: Vec<(String, f64)>,
+    pub(super) constant: Constant,
+}
+
+/// Which model, and its outputs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Kind {
+    /// Of polynomials.
+    Linear {
+        output: String,
+        orders: Orders,
+        /// That of a regularised impulse response.
+        kernel: Option<Kernel>,
+    },
+    /// Of polynomials with matrices for coefficients.
+    VectorArx { outputs: Vec<String>, delays: Vec<usize>, arx: VectorArxOptions },
+}
+
+impl Settings {
+    pub(super) fn of(plan: &Plan) -> Result<Self, Error> {
+        plan.check()?;
+        let Choice::Known(orders) = &plan.choice else {
+            return Err(Error::argument("orders", "pieces of a log make one model; give its orders"));
+        };
+        if !orders.is_linear() {
+            return Err(Error::argument(
+                "orders",
+                "a model with C, D or F is found by a search, which reads the data again and again; from pieces come models with A and B",
+            ));
+        }
+        let kernel = match plan.method {
+            Method::PredictionError(_) => None,
+            Method::Regularised(kernel) => Some(kernel),
+            _ => {
+                return Err(Error::argument(
+                    "method",
+                    "normal equations give least squares; leave the other method or criterion out",
+                ));
+            }
+        };
+        check_rows(&plan.estimate, &plan.validate, plan.split)?;
+        check_detrend(plan.detrend)?;
+        let refused = [
+            (
+                plan.prefilter.is_some(),
+                "prefilter",
+                "a filter reaches over the borders of pieces; filter the signals before",
+            ),
+            (
+                plan.trend,
+                "trend",
+                "pieces have no common line; leave it out, or take the trend from the signals before",
+            ),
+            (
+                matches!(plan.initial, Initial::Zero | Initial::Estimate),
+                "initial",
+                "rows without a full regressor are left out; give drop, or leave it out",
+            ),
+        ];
+        if let Some((_, argument, message)) = refused.into_iter().find(|(refused, _, _)| *refused) {
+            return Err(Error::argument(argument, message));
+        }
+        Ok(Self {
+            inputs: plan.inputs.clone(),
+            kind: Kind::Linear { output: plan.output.clone(), orders: orders.clone(), kernel },
+            detrend: plan.detrend.to_string(),
+            offsets: plan.offsets.clone(),
+            constant: plan.constant(),
+        })
+    }
+
+    /// Of an ARX model with several outputs.
+    pub(super) fn of_states(plan: &StateSpacePlan) -> Result<Self, Error> {
+        plan.check()?;
+        let Some(arx) = &plan.arx else {
+            return Err(Error::argument(
+                "arx",
+                "the states of a subspace method are evaluated on the log itself, a second time; from pieces of a log come ARX models",
+            ));
+        };
+        check_rows(&plan.estimate, &plan.validate, plan.split)?;
+        check_detrend(plan.detrend)?;
+        if arx.delay != (0..=0) {
+            return Err(Error::argument(
+                "nk",
+                "the rows of a model change with its delay, and the log is not read again; give one number for each input",
+            ));
+        }
+        let delays = if plan.delays.is_empty() { vec![0; plan.inputs.len()] } else { plan.delays.clone() };
+        let arx = VectorArxOptions { constant: false, ..arx.clone() };
+        let settings = Self {
+            inputs: plan.inputs.clone(),
+            kind: Kind::VectorArx { outputs: plan.outputs.clone(), delays, arx },
+            detrend: plan.detrend.to_string(),
+            offsets: plan.offsets.clone(),
+            constant: plan.resolved_constant(),
+        };
+        if settings.lags() > MOST_LAGS {
+            return Err(Error::argument(
+                "na",
+                format!("lags above {MOST_LAGS} are not read; give lower orders"),
+            ));
+        }
+        Ok(settings)
+    }
+
+    /// How many rows the model reaches back to.
+    pub(super) fn lags(&self) -> usize {
+        match &self.kind {
+            Kind::Linear { orders, .. } => orders.maximum_lag(),
+            Kind::VectorArx { delays, arx, .. } => {
+                let late = delays.iter().copied().max().unwrap_or(0);
+                late.saturating_add(arx.longest(self.inputs.len()))
+            }
+        }
+    }
+
+    pub(super) fn outputs(&self) -> &[String] {
+        match &self.kind {
+            Kind::Linear { output, .. } => std::slice::from_ref(output),
+            Kind::VectorArx { outputs, .. } => outputs,
+        }
+    }
+
+    /// The channels, the inputs first.
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.inputs.iter().chain(self.outputs()).map(String::as_str).collect()
+    }
+
+    /// What is set by hand of a channel, or nothing at all; none: its mean.
+    pub(super) fn told_offset(&self, name: &str) -> Option<f64> {
+        let by_hand = self.offsets.iter().find(|(channel, _)| channel == name).map(|(_, level)| *level);
+        by_hand.or((self.detrend == Detrend::None.to_string()).then_some(0.0))
+    }
+
+    pub(super) fn check_same(&self, other: &Self) -> Result<(), Error> {
+        let differ = |message: String| Err(Error::argument("pieces", message));
+        if self.names() != other.names() {
+            return differ(format!(
+                "the first ones have the channels {}, the second ones {}; make all of the same",
+                self.names().join(", "),
+                other.names().join(", ")
+            ));
+        }
+        let (own, others) = (self.kind.to_string(), other.kind.to_string());
+        if own != others {
+            return differ(format!(
+                "the first ones are of {own}, the second ones of {others}; make all with the same orders"
+            ));
+        }
+        if self != other {
+            return differ(
+                "they were made with other offsets, another constant, or another kernel; make all with the same settings".to_owned(),
+            );
+        }
+        Ok(())
+    }
+
+    /// Whether these can be those of sums over `size` columns. What indexes anything is checked here.
+    pub(super) fn fits(&self, size: usize) -> bool {
+        let inputs = self.inputs.len();
+        let of_kind = match &self.kind {
+            Kind::Linear { orders: own @ Orders { na, nb, nc, nd, nf, nk }, .. } => {
+                Orders::new(*na, nb, *nc, *nd, nf, nk).is_ok()
+                    && own.is_linear()
+                    && own.inputs() == inputs
+                    // One and y(t) beside the regressors.
+                    && size == own.parameters() + 2
+            }
+            Kind::VectorArx { outputs, delays, arx } => {
+                let signals = inputs + outputs.len();
+                let columns = (arx.longest(inputs) as u128 + 1) * signals as u128 + 1;
+                !outputs.is_empty()
+                    && delays.len() == inputs
+                    && arx.delay == (0..=0)
+                    && !matches!(&arx.nb, VectorArxInputs::Each(each) if each.len() != inputs)
+                    && self.lags() <= MOST_LAGS
+                    && columns == size as u128
+            }
+        };
+        of_kind
+            && matches!(self.detrend.parse(), Ok(Detrend::Mean | Detrend::None))
+            && self.offsets.iter().all(|(_, level)| level.is_finite())
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Linear { orders, .. } => write!(formatter, "{orders}"),
+            Self::VectorArx { outputs, delays, arx } => {
+                let range = |range: &std::ops::RangeInclusive<usize>| match (range.start(), range.end()) {
+                    (first, last) if first == last => first.to_string(),
+                    (first, last) => format!("{first}..{last}"),
+                };
+                let each = |values: &mut dyn Iterator<Item = usize>| {
+                    let values: Vec<String> = values.map(|value| value.to_string()).collect();
+                    format!("[{}]", values.join(" "))
+                };
+                let nb = match &arx.nb {
+                    VectorArxInputs::Alike(nb) => range(nb),
+                    VectorArxInputs::Each(nb) => each(&mut nb.iter().copied()),
+                };
+                let first = usize::from(!arx.direct);
+                let nk = each(&mut delays.iter().map(|delay| delay + first));
+                let inputs = if delays.is_empty() { String::new() } else { format!(", {nb}, {nk}") };
+                write!(formatter, "ARX({}{inputs}) with {} outputs", range(&arx.na), outputs.len())
+            }
+        }
+    }
+}
+
+fn check_rows(estimate: &[Rows], validate: &[Rows], split: Option<Split>) -> Result<(), Error> {
+    if estimate.is_empty() && validate.is_empty() && split.is_none() {
+        return Ok(());
+    }
+    Err(Error::argument(
+        "rows",
+        "all rows of a piece serve for the fit; cut the pieces, and validate the model on other ones",
+    ))
+}
+
+fn check_detrend(detrend: Detrend) -> Result<(), Error> {
+    if matches!(detrend, Detrend::Mean | Detrend::None) {
+        return Ok(());
+    }
+    Err(Error::argument(
+        "detrend",
+        "what is taken from the channels of all pieces is their mean or nothing; give mean or none",
+    ))
+}

@@ -1,0 +1,60 @@
+//! What is known of the values of a channel.
+
+use std::ops::Range;
+
+use faer::fx128;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::regression::extended_sum;
+
+/// What the pieces together say of a channel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(super) struct Totals {
+    /// Samples that count for the mean; none of the past.
+    rows: usize,
+    /// Their sum, and what that number lacks.
+    sum: [f64; 2],
+    /// The least and the largest of them; none where there is none.
+    pub(super) range: Option<[f64; 2]>,
+    pub(super) missing: usize,
+}
+
+impl Totals {
+    /// Those of a channel of a piece, its past being left out; the samples in `segments` count.
+    pub(super) fn of(values: &[f64], past: usize, segments: &[Range<usize>]) -> Self {
+        let sums = segments.iter().map(|rows| extended_sum(&values[rows.clone()]));
+        let sum = sums.fold(fx128::ZERO, fx128::add_accurate);
+        let each = || segments.iter().flat_map(|rows| &values[rows.clone()]).copied();
+        let range = each().fold(None, |range: Option<[f64; 2]>, value| {
+            let [least, largest] = range.unwrap_or([value; 2]);
+            Some([least.min(value), largest.max(value)])
+        });
+        let missing = values[past..].iter().filter(|value| value.is_nan()).count();
+        Self { rows: segments.iter().map(Range::len).sum(), sum: [sum.0, sum.1], range, missing }
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        let sum = self.sum().add_accurate(other.sum());
+        self.sum = [sum.0, sum.1];
+        self.rows += other.rows;
+        self.missing += other.missing;
+        self.range = match (self.range, other.range) {
+            (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
+            (own, more) => own.or(more),
+        };
+    }
+
+    fn sum(&self) -> fx128 {
+        let [sum, rest] = self.sum;
+        fx128::from_f64(sum).add_accurate(fx128::from_f64(rest))
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        (self.sum() / fx128::from_f64(self.rows as f64)).0
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.sum.iter().all(|value| value.is_finite())
+    }
+}

@@ -78,7 +78,7 @@ impl Log {
         };
         let log = log.map_err(|error| error::batch(py, error))?;
         let rows = Rows::new(1, log.rows()).map_err(|error| error::batch(py, error))?;
-        let source = Source { file: "memory".to_owned(), rows, time: called, start, resampled };
+        let source = Source { file: Source::IN_MEMORY.to_owned(), rows, time: called, start, resampled };
         Ok(Self { log: Arc::new(log), sources: vec![source], inputs, outputs })
     }
 

@@ -41,6 +41,7 @@ mod equations;
 mod evaluate;
 mod experiments;
 mod fitted_rows;
+mod from_sums;
 mod held_out_runs;
 #[cfg(feature = "html")]
 mod html;
@@ -60,6 +61,7 @@ mod state_space;
 mod suited;
 #[cfg(test)]
 mod tests;
+mod totals;
 mod validation;
 mod warnings;
 

@@ -21,6 +21,11 @@ pub struct Source {
     pub resampled: Option<Resampling>,
 }
 
+impl Source {
+    /// What a log is called that is no file.
+    pub const IN_MEMORY: &str = "memory";
+}
+
 /// How a log was put on another clock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Resampling {

@@ -17,7 +17,7 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use super::experiments::Experiments;
+use super::experiment_data::ExperimentData;
 use super::prediction_error::prediction_error;
 use super::predictor::InitialCondition;
 use super::{Estimate, Initial, Method, Monitor};
@@ -159,7 +159,7 @@ impl<'a> Distributed<'a> {
     }
 }
 
-impl Experiments for Distributed<'_> {
+impl ExperimentData for Distributed<'_> {
     type Errors<'e>
         = DistributedErrors<'e>
     where

@@ -39,7 +39,7 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::experiments::Experiments;
+use super::experiment_data::ExperimentData;
 use super::predictor::InitialCondition;
 use super::{ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, exact, prediction_error};
 use crate::Error;
@@ -124,7 +124,7 @@ impl<D> Clone for Task<'_, D> {
 
 impl<D> Copy for Task<'_, D> {}
 
-impl<D: Experiments> Task<'_, D> {
+impl<D: ExperimentData> Task<'_, D> {
     /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `start` has the
     /// parameters of a model with both, where a choice among models has found some.
     ///

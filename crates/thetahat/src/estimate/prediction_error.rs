@@ -8,7 +8,7 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows};
-use super::experiments::{Experiments, PredictionErrors};
+use super::experiment_data::{ExperimentData, PredictionErrors};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Unusable;
 use super::predictor::{InitialCondition, Predictor};
@@ -37,7 +37,7 @@ pub(crate) fn drop_is_not_for_f() -> Error {
 
 /// How the initial conditions are treated.
 fn begins(
-    data: &impl Experiments,
+    data: &impl ExperimentData,
     orders: &Orders,
     initial: Initial,
 ) -> Result<(InitialCondition, bool), Error> {
@@ -55,7 +55,7 @@ fn begins(
 
 /// Fits A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t) by a search for the least sum of squared prediction
 /// errors from several starts; an ARX model in one step.
-pub(super) fn prediction_error<D: Experiments>(
+pub(super) fn prediction_error<D: ExperimentData>(
     data: &D,
     orders: &Orders,
     initial: Initial,
@@ -133,7 +133,7 @@ impl Job<'_> {
     ///
     /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a few
     /// iterations on all samples are left.
-    fn beginning<D: Experiments>(
+    fn beginning<D: ExperimentData>(
         &self,
         data: &D,
         orders: &Orders,
@@ -176,7 +176,7 @@ impl Job<'_> {
     /// compared with what it found.
     fn search_from(
         &self,
-        data: &impl Experiments,
+        data: &impl ExperimentData,
         orders: &Orders,
         begin: InitialCondition,
         predictor: &mut impl PredictionErrors,
@@ -214,7 +214,7 @@ impl Job<'_> {
     /// Estimates the initial conditions where that is worth its parameters: N ln(V_zero/V_estimate) > n ln N.
     ///
     /// One of the two searches is done, where a step of the other predicts that it cannot change the answer.
-    fn choose<'d, D: Experiments>(
+    fn choose<'d, D: ExperimentData>(
         &self,
         data: &'d D,
         orders: &Orders,
@@ -266,7 +266,7 @@ impl Job<'_> {
     /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial conditions.
     ///
     /// No search is done where a step predicts that it cannot change the answer.
-    fn with_inputs<'d, D: Experiments>(
+    fn with_inputs<'d, D: ExperimentData>(
         &self,
         data: &'d D,
         orders: &Orders,
@@ -432,7 +432,7 @@ fn uncertainty(
 /// The covariance of all parameters of a model of which some were not estimated, those of a constant and a trend, if they were,
 /// and the Gauss-Newton step to their estimate. None where they cannot be told from the others.
 pub(super) fn beside(
-    data: &impl Experiments,
+    data: &impl ExperimentData,
     orders: &Orders,
     estimate: &Estimate,
     parameters: &[f64],
@@ -447,7 +447,7 @@ pub(super) fn beside(
 }
 
 /// The prediction errors of data with the initial conditions that an estimate from them has.
-pub(super) fn predictor_of<'d, D: Experiments>(
+pub(super) fn predictor_of<'d, D: ExperimentData>(
     data: &'d D,
     orders: &Orders,
     estimate: &Estimate,

@@ -6,26 +6,22 @@ mod tests;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use faer::fx128;
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
-use super::fitted_rows::estimation_start;
-use super::identify::{ROUNDING, channels, constant, estimation_of, estimation_rows};
+use super::from_sums::report_of;
+use super::identify::{channels, estimation_rows};
 use super::schema::{Data, Missing, Report};
-use super::warnings::warnings;
+use super::totals::Totals;
+use crate::Error;
 use crate::data::{Detrend, Log, Offset, Record, Rows, Source, digests};
 use crate::estimate::{
-    Answer, Ask, Beside, Distributed, Fitted, Holders, Initial, Method, Question, Task, enough,
-    seen_by_starts,
+    Answer, Ask, Beside, Constant, Distributed, ExperimentData, Fitted, Holders, Initial, Method, Question,
+    Task, enough, seen_by_starts,
 };
-use crate::model::{Orders, Signal, Structure};
+use crate::model::{Orders, Structure};
 use crate::optimize::Monitor;
-use crate::regression::extended_sum;
-use crate::respond::Horizon;
 use crate::select::{Choice, Focus};
-use crate::validate::{Fit, Part};
-use crate::{Document, Error};
 
 /// Experiments that others hold, in other processes or on other machines, as one model of all of them sees them: OE, ARMAX, Box-Jenkins,
 /// or any other that a search finds.
@@ -77,6 +73,7 @@ use crate::{Document, Error};
 #[serde(deny_unknown_fields)]
 pub struct Experiments {
     /// The inputs, and the output after them.
+    names: Vec<String>,
     channels: Vec<Totals>,
     sample_time: f64,
     holders: Vec<Holder>,
@@ -91,18 +88,6 @@ struct Holder {
     rows: usize,
     /// The rows that count, counted from its first one.
     segments: Vec<Range<usize>>,
-}
-
-/// What is known of the values of a channel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Totals {
-    name: String,
-    /// Samples that count for the mean, their sum, and what that number lacks.
-    rows: usize,
-    sum: [f64; 2],
-    /// The least and the largest of them; none where there is none.
-    range: Option<[f64; 2]>,
-    missing: usize,
 }
 
 impl Experiments {
@@ -123,10 +108,11 @@ impl Experiments {
         let record = estimation_rows(log, plan, orders, &all)?;
         let totals = names.iter().map(|name| {
             let own = if *name == plan.output { &segments } else { &record.segments };
-            Ok(Totals::of(name, &log.channel(name)?.values, own))
+            Ok(Totals::of(&log.channel(name)?.values, 0, own))
         });
         Ok(Self {
             channels: totals.collect::<Result<_, Error>>()?,
+            names: names.iter().map(|name| (*name).to_owned()).collect(),
             sample_time: log.sample_time(),
             holders: vec![Holder { rows: log.rows(), segments: record.segments.clone() }],
             time_gaps: log.gaps(),
@@ -195,7 +181,7 @@ impl Experiments {
 
     /// The names of the channels, the output last.
     pub fn channels(&self) -> Vec<&str> {
-        self.channels.iter().map(|own| own.name.as_str()).collect()
+        self.names.iter().map(String::as_str).collect()
     }
 
     /// All rows.
@@ -214,23 +200,13 @@ impl Experiments {
     /// [`Error::Undetermined`] for an input or an output that is constant.
     pub fn offsets(&self, plan: &Plan) -> Result<Vec<f64>, Error> {
         let orders = searched(plan)?;
-        let each = self.channels.iter().enumerate().map(|(place, totals)| {
-            let [least, largest] = totals.range.ok_or_else(|| {
-                Error::data("no row has a value in every channel; give other experiments or channels")
-            })?;
-            let by_hand = plan.offsets.iter().find(|(channel, _)| *channel == totals.name);
-            let level = match by_hand {
-                Some((_, level)) => *level,
-                None if plan.detrend == Detrend::None => 0.0,
-                None => totals.mean(),
-            };
-            let input = (place < orders.inputs()).then_some(place);
-            let used = input.is_none_or(|input| orders.nb[input] > 0);
-            let size = |least: f64, largest: f64| least.abs().max(largest.abs());
-            if used && size(least - level, largest - level) <= ROUNDING * size(least, largest) {
-                return Err(constant(&totals.name, input, Some(orders), false));
-            }
-            Ok(level)
+        let each = self.names.iter().zip(&self.channels).enumerate().map(|(place, (name, totals))| {
+            let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name).map(|(_, level)| *level);
+            let told = by_hand.or((plan.detrend == Detrend::None).then_some(0.0));
+            let level = totals.level(name, told, (place < orders.inputs()).then_some(place), orders);
+            level.unwrap_or_else(|| {
+                Err(Error::data("no row has a value in every channel; give other experiments or channels"))
+            })
         });
         each.collect()
     }
@@ -254,24 +230,16 @@ impl Experiments {
         let beside = Beside::constant(near.rows(), self.sample_time);
         let record = near.record();
         let (inputs, initial, constant) = (plan.inputs.as_slice(), plan.initial, plan.constant());
-        let mut fitted;
-        if near.is_all {
-            let task = Task { data: &record, inputs, orders, method: &method, initial, monitor };
-            fitted = task.fit(constant, &beside, None)?;
-            if fitted.offset.is_none() && plan.takes_output_offset() {
-                fitted.open = task.left_open(&beside, &fitted.estimate)?;
-            }
+        let fit = Fit { constant, beside: &beside, takes_offset: plan.takes_output_offset() };
+        let fitted = if near.is_all {
+            fit.of(&Task { data: &record, inputs, orders, method: &method, initial, monitor })?
         } else {
             let data = Distributed::new(&holders, record, near.energy);
-            let task = Task { data: &data, inputs, orders, method: &method, initial, monitor };
-            let found = task.fit(constant, &beside, None);
-            fitted = holders.failure().map_or(found, Err)?;
-            if fitted.offset.is_none() && plan.takes_output_offset() {
-                fitted.open = task.left_open(&beside, &fitted.estimate)?;
-            }
-        }
+            let found = fit.of(&Task { data: &data, inputs, orders, method: &method, initial, monitor });
+            holders.failure().map_or(found, Err)?
+        };
         let spread = holders.output_spread(orders, fitted.estimate.initial() == Initial::Zero)?;
-        self.report(plan, orders, &fitted, &offsets, spread)
+        report_of(self.data(plan)?, &fitted, orders, (&self.channels(), &offsets), spread)
     }
 
     /// The log without the offsets of its channels, which [`offsets`](Self::offsets) gives: what is asked for answers.
@@ -295,69 +263,42 @@ impl Experiments {
         question.answered_by(&estimation_rows(deviations, plan, searched(plan)?, &all)?)
     }
 
-    fn report(
-        &self,
-        plan: &Plan,
-        orders: &Orders,
-        fitted: &Fitted,
-        offsets: &[f64],
-        spread: f64,
-    ) -> Result<Report, Error> {
-        let Fitted { estimate, offset, open, .. } = fitted;
-        let level = |level: f64| Offset { level, slope: 0.0 };
-        let signal =
-            |(totals, offset): (&Totals, &f64)| Signal { name: totals.name.clone(), offset: level(*offset) };
-        let mut inputs: Vec<Signal> = self.channels.iter().zip(offsets).map(signal).collect();
-        let output = inputs.pop().ok_or_else(|| Error::data("there is no output"))?;
-        let taken = output.offset;
-        let mut model = estimate.to_model(orders, self.sample_time, inputs, output)?;
-        model.offset_covariance.clone_from(open);
-        model.output.offset.level += offset.map_or(0.0, |found| found.offset.level);
-        let rows = self.rows();
-        let estimation = vec![Rows::new(1, rows)?];
-        let missing = self.channels.iter();
-        let mut report = Report {
-            schema: Report::SCHEMA.to_owned(),
-            generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-            data: Data {
-                logs: self.logs.clone(),
-                digests: self.digests.clone(),
-                rows,
-                sample_time: self.sample_time,
-                detrend: plan.detrend.to_string(),
-                prefilter: None,
-                estimation: estimation.clone(),
-                validation: Vec::new(),
-                split: None,
-                segments: self.segments().iter().map(Rows::from_positions).collect(),
-                missing: missing
-                    .map(|own| Missing { channel: own.name.clone(), rows: own.missing })
-                    .collect(),
-                time_gaps: self.time_gaps,
-            },
-            selection: None,
-            estimation: estimation_of(fitted, taken),
-            fit: Vec::new(),
-            warnings: Vec::new(),
-            model: model.clone().into(),
-        };
-        report.warnings = warnings(&report, &model);
-        let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
-        let (samples, mse) = (estimate.samples(), estimate.mse());
-        report.fit.push(Fit {
-            output: plan.output.clone(),
-            rows: estimation,
-            part: Some(Part::Estimation),
-            horizon: Horizon::Steps { steps: 1 },
-            initial: estimation_start(&report, &model),
-            samples,
-            percent: finite(100.0 * (1.0 - (mse * samples as f64).sqrt() / spread)),
-            rmse: finite(mse.sqrt()),
-            mean_absolute_error: None,
-            largest_error: None,
-            outside: None,
-        });
-        Ok(report)
+    /// What the model is fitted to.
+    fn data(&self, plan: &Plan) -> Result<Data, Error> {
+        let missing = self.names.iter().zip(&self.channels);
+        Ok(Data {
+            logs: self.logs.clone(),
+            digests: self.digests.clone(),
+            rows: self.rows(),
+            sample_time: self.sample_time,
+            detrend: plan.detrend.to_string(),
+            prefilter: None,
+            estimation: vec![Rows::new(1, self.rows())?],
+            validation: Vec::new(),
+            split: None,
+            segments: self.segments().iter().map(Rows::from_positions).collect(),
+            missing: missing
+                .map(|(name, totals)| Missing { channel: name.clone(), rows: totals.missing })
+                .collect(),
+            time_gaps: self.time_gaps,
+        })
+    }
+}
+
+/// What is fitted beside the parameters.
+struct Fit<'f> {
+    constant: Constant,
+    beside: &'f Beside,
+    takes_offset: bool,
+}
+
+impl Fit<'_> {
+    fn of<D: ExperimentData>(&self, task: &Task<'_, D>) -> Result<Fitted, Error> {
+        let mut fitted = task.fit(self.constant, self.beside, None)?;
+        if fitted.offset.is_none() && self.takes_offset {
+            fitted.open = task.left_open(self.beside, &fitted.estimate)?;
+        }
+        Ok(fitted)
     }
 }
 
@@ -416,44 +357,6 @@ impl Near {
             segments: self.segments.clone(),
             past: vec![0; self.segments.len()],
         }
-    }
-}
-
-impl Totals {
-    fn of(name: &str, values: &[f64], own: &[Range<usize>]) -> Self {
-        let sums = own.iter().map(|rows| extended_sum(&values[rows.clone()]));
-        let sum = sums.fold(fx128::ZERO, fx128::add_accurate);
-        let each = || own.iter().flat_map(|rows| &values[rows.clone()]).copied();
-        let range = each().fold(None, |range: Option<[f64; 2]>, value| {
-            let [least, largest] = range.unwrap_or([value; 2]);
-            Some([least.min(value), largest.max(value)])
-        });
-        Self {
-            name: name.to_owned(),
-            rows: own.iter().map(Range::len).sum(),
-            sum: [sum.0, sum.1],
-            range,
-            missing: values.iter().filter(|value| value.is_nan()).count(),
-        }
-    }
-
-    fn add(&mut self, other: &Self) {
-        let sum = self.whole().add_accurate(other.whole());
-        self.sum = [sum.0, sum.1];
-        self.rows += other.rows;
-        self.missing += other.missing;
-        self.range = match (self.range, other.range) {
-            (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
-            (own, more) => own.or(more),
-        };
-    }
-
-    fn whole(&self) -> fx128 {
-        fx128::from_f64(self.sum[0]).add_accurate(fx128::from_f64(self.sum[1]))
-    }
-
-    fn mean(&self) -> f64 {
-        (self.whole() / fx128::from_f64(self.rows as f64)).0
     }
 }
 

@@ -5,7 +5,6 @@ mod linear;
 mod settings;
 #[cfg(test)]
 mod tests;
-mod totals;
 mod vector_arx;
 
 use std::collections::BTreeMap;
@@ -15,18 +14,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Plan;
+use super::from_sums::one_step;
 use super::identify::{channels, estimation_rows};
 use super::schema::{Data, Missing, Report};
 use super::state_space::StateSpacePlan;
+use super::totals::Totals;
 use crate::data::{Log, Record, Rows, Source, digests};
 use crate::estimate::{joint_products, joint_taps, lagged_products};
 use crate::regression::ExtendedGram;
-use crate::respond::{Horizon, InitialCondition};
-use crate::validate::{Fit, Part};
+use crate::respond::InitialCondition;
+use crate::validate::Fit;
 use crate::{Document, Error};
 use border::Border;
 use settings::{Kind, Settings};
-use totals::Totals;
 
 /// The normal equations of a model that is linear in its parameters: made from a piece of the data, added to those of other pieces,
 /// solved at the end. The JSON document `thetahat.normal-equations/1`.
@@ -313,9 +313,11 @@ impl NormalEquations {
         self.products.rows()
     }
 
-    /// The number of pieces.
+    /// The number of pieces. Neighbours with the name of one file are one.
     pub fn pieces(&self) -> usize {
-        self.estimation.len()
+        let named = self.logs.len() == self.estimation.len();
+        let same = |pair: &&[Source]| pair[0].file == pair[1].file && pair[0].file != Source::IN_MEMORY;
+        self.estimation.len() - if named { self.logs.windows(2).filter(same).count() } else { 0 }
     }
 
     /// The model and its orders, such as ARX(2, 2, 1).
@@ -376,20 +378,7 @@ impl NormalEquations {
         spread: f64,
         initial: InitialCondition,
     ) -> Fit {
-        let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
-        Fit {
-            output: output.to_owned(),
-            rows: self.estimation.clone(),
-            part: Some(Part::Estimation),
-            horizon: Horizon::ONE_STEP,
-            initial,
-            samples,
-            percent: finite(100.0 * (1.0 - (mse * samples as f64).sqrt() / spread)),
-            rmse: finite(mse.sqrt()),
-            mean_absolute_error: None,
-            largest_error: None,
-            outside: None,
-        }
+        one_step(output, &self.estimation, (samples, mse), spread, initial)
     }
 }
 

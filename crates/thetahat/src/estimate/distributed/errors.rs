@@ -8,7 +8,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use super::message::{AboutErrors, Asked, Factor, Found, ModelErrors, Point, Sums};
 use super::{Distributed, Holders};
 use crate::estimate::border::Border;
-use crate::estimate::experiments::PredictionErrors;
+use crate::estimate::experiment_data::PredictionErrors;
 use crate::estimate::polynomials::{Polynomials, Unusable};
 use crate::estimate::predictor::InitialCondition;
 use crate::estimate::uncertainty::{Autoregression, ErrorProducts, HIGHEST};

@@ -1,7 +1,7 @@
 //! Whether a constant is worth its parameter.
 
 use super::super::arx::with_past;
-use super::super::experiments::{Experiments, PredictionErrors};
+use super::super::experiment_data::{ExperimentData, PredictionErrors};
 use super::super::prediction_error::predictor_of;
 use super::super::{Estimate, Initial, Norm, Procedure, arx};
 use crate::data::Record;
@@ -14,7 +14,7 @@ const DEPENDENT: f64 = 1e-9;
 
 /// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their autoregression.
 /// None where they cannot be computed.
-pub(super) fn white_samples(data: &impl Experiments, orders: &Orders, estimate: &Estimate) -> Option<f64> {
+pub(super) fn white_samples(data: &impl ExperimentData, orders: &Orders, estimate: &Estimate) -> Option<f64> {
     let mut predictor = predictor_of(data, orders, estimate);
     best_free(&mut predictor, estimate.parameters()).ok()?;
     let taken = orders.parameters() + predictor.initial_conditions();

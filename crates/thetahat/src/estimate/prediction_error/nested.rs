@@ -11,7 +11,7 @@ use super::{Job, Problem};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{
-    experiments::PredictionErrors,
+    experiment_data::PredictionErrors,
     polynomials::extended,
     predictor::InitialCondition,
     start::Plants,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::nested::thinned;
 use super::{Job, Problem, TrackStart, hopeless};
 use crate::Error;
-use crate::estimate::experiments::PredictionErrors;
+use crate::estimate::experiment_data::PredictionErrors;
 use crate::estimate::outcome::StartOutcome;
 use crate::estimate::predictor::InitialCondition;
 use crate::estimate::restart::restarts;

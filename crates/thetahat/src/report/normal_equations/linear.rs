@@ -1,14 +1,11 @@
 //! The model of polynomials that normal equations hold.
 
-use super::super::fitted_rows::estimation_start;
-use super::super::identify::{ROUNDING, constant, estimation_of};
+use super::super::from_sums::report_of;
 use super::super::schema::Report;
-use super::super::warnings::warnings;
 use super::NormalEquations;
-use crate::data::Offset;
-use crate::estimate::{Fitted, Kernel, LinearProblem, out_of_range, taps};
-use crate::model::{Orders, Signal};
-use crate::{Document, Error};
+use crate::Error;
+use crate::estimate::{Kernel, LinearProblem, out_of_range, taps};
+use crate::model::Orders;
 
 /// With the offsets of all pieces, and a constant where it is worth its parameter.
 pub(super) fn solve(
@@ -17,19 +14,13 @@ pub(super) fn solve(
     kernel: Option<Kernel>,
 ) -> Result<Report, Error> {
     let names = sums.settings.names();
-    let offsets = (0..names.len())
-        .map(|channel| {
-            let level = sums.offset(channel)?;
-            let input = (channel < orders.inputs()).then_some(channel);
-            let used = input.is_none_or(|input| orders.nb[input] > 0);
-            let [least, largest] = sums.range(channel)?;
-            let size = |least: f64, largest: f64| least.abs().max(largest.abs());
-            if used && size(least - level, largest - level) <= ROUNDING * size(least, largest) {
-                return Err(constant(names[channel], input, Some(orders), false));
-            }
-            Ok(level)
-        })
-        .collect::<Result<Vec<_>, Error>>()?;
+    let offsets = names.iter().enumerate().map(|(channel, name)| {
+        let input = (channel < orders.inputs()).then_some(channel);
+        sums.range(channel)?;
+        let level = sums.channels[channel].level(name, sums.settings.told_offset(name), input, orders);
+        level.unwrap_or(Ok(0.0))
+    });
+    let offsets = offsets.collect::<Result<Vec<_>, Error>>()?;
     // y is the first signal of a regression.
     let (taken, of_inputs) = offsets.split_last().ok_or_else(|| Error::data("there is no output"))?;
     let of_signals: Vec<f64> = std::iter::once(taken).chain(of_inputs).copied().collect();
@@ -43,27 +34,5 @@ pub(super) fn solve(
     if fitted.offset.is_none() && sums.settings.told_offset(output).is_none() {
         fitted.open = problem.left_open(&fitted.estimate);
     }
-    let Fitted { estimate, offset, open, .. } = &fitted;
-    let level = |level: f64| Offset { level, slope: 0.0 };
-    let signal = |(name, offset): (&&str, &f64)| Signal { name: (*name).to_owned(), offset: level(*offset) };
-    let found = offset.map_or(0.0, |found| found.offset.level);
-    let signals = names.iter().zip(of_inputs).map(signal).collect();
-    let mut model = estimate.to_model(orders, sums.sample_time, signals, signal((&output, taken)))?;
-    model.offset_covariance.clone_from(open);
-    model.output.offset.level = taken + found;
-    let mut report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        data: sums.data(),
-        selection: None,
-        estimation: estimation_of(&fitted, level(*taken)),
-        fit: Vec::new(),
-        warnings: Vec::new(),
-        model: model.clone().into(),
-    };
-    report.warnings = warnings(&report, &model);
-    let start = estimation_start(&report, &model);
-    let errors = (estimate.samples(), estimate.mse());
-    report.fit.push(sums.one_step(output, errors, problem.output_spread(), start));
-    Ok(report)
+    report_of(sums.data(), &fitted, orders, (&names, &offsets), problem.output_spread())
 }

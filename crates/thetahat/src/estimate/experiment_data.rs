@@ -15,13 +15,13 @@ use crate::model::Orders;
 use crate::optimize::Objective;
 
 /// The data of some experiments.
-pub(crate) trait Experiments {
+pub(crate) trait ExperimentData {
     /// Their prediction errors.
     type Errors<'e>: PredictionErrors
     where
         Self: 'e;
     /// The same data with further inputs.
-    type Wider<'e>: Experiments
+    type Wider<'e>: ExperimentData
     where
         Self: 'e;
 
@@ -91,7 +91,7 @@ pub(crate) trait PredictionErrors: Objective<Refusal = Unusable> {
     fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> Option<DMatrix<f64>>;
 }
 
-impl Experiments for Record<'_> {
+impl ExperimentData for Record<'_> {
     type Errors<'e>
         = Predictor<'e>
     where

@@ -6,6 +6,9 @@ use faer::fx128;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::identify::{ROUNDING, constant};
+use crate::Error;
+use crate::model::Orders;
 use crate::regression::extended_sum;
 
 /// What the pieces together say of a channel.
@@ -52,6 +55,25 @@ impl Totals {
 
     pub(super) fn mean(&self) -> f64 {
         (self.sum() / fx128::from_f64(self.rows as f64)).0
+    }
+
+    /// What is told to be taken from the channel, or its mean. None without a sample that counts.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if nothing but rounding is left of an output, or an input that the orders use.
+    pub(super) fn level(
+        &self,
+        name: &str,
+        told: Option<f64>,
+        input: Option<usize>,
+        orders: &Orders,
+    ) -> Option<Result<f64, Error>> {
+        let [least, largest] = self.range?;
+        let level = told.unwrap_or_else(|| self.mean());
+        let used = input.is_none_or(|input| orders.nb[input] > 0);
+        let size = |least: f64, largest: f64| least.abs().max(largest.abs());
+        let rests = used && size(least - level, largest - level) <= ROUNDING * size(least, largest);
+        Some(if rests { Err(constant(name, input, Some(orders), false)) } else { Ok(level) })
     }
 
     pub(super) fn is_finite(&self) -> bool {

@@ -34,10 +34,10 @@ const SAME_STEP: f64 = 0.01;
 ///   it is the same as another one.
 /// - from the moments of lagged signals up to lag 112: delays, with a constant in all models, and prewhitened correlations. Of each
 ///   segment they leave out as many first samples.
-/// - from counts of values: the median step and the step to which a channel is rounded are exact while there are no more than 65,536
-///   different ones (fewer of more than 16 channels). Beyond that the median has a relative error of 2^-10 at most, in practice, and the
-///   rounding is left out. The limit of outliers follows from two quantiles of such counts; of more than 16,384 outliers the farthest
-///   are counted.
+/// - from counts of values: the median step is exact while there are no more than 65,536 different ones; beyond that it has a relative
+///   error of 2^-10 at most, in practice. The limit of outliers follows from two quantiles of such counts; of more than 16,384 outliers
+///   the farthest are counted. What a channel is rounded to is told of up to 65,536 different values. (Of more than 16 channels these
+///   numbers are less, down to a sixteenth.)
 /// - of the first 100,000 rows, or of the first part if it has fewer: feedback, impulse responses.
 /// - left out: whether a step test begins at rest, delays where there are more than seven inputs or the sums lack the digits, and
 ///   excitation, delays and feedback where the clock is irregular or goes back: the log is not resampled.
@@ -45,8 +45,8 @@ const SAME_STEP: f64 = 0.01;
 /// The warnings of the document name what is left out, and what is of the first rows. Gaps are told by the median step of the first part; where
 /// the whole log has another one, what depends on it is left out.
 ///
-/// Cost: O(N (log L + q^2 L)) for N rows, q inputs and outputs and L = 112; the memory of a part, 4 MB for each channel (of more than 16: in
-/// all 100 MB at most, up to 1000 channels), and some 30 MB for the lags of eight signals.
+/// Cost: O(N (log L + q^2 L)) for N rows, q inputs and outputs and L = 112; the memory of a part, 4 MB for each channel (0.3 MB of more
+/// than 256), and some 30 MB for the lags of eight signals.
 ///
 /// Source: the sums are those of `regression::lagged_moments` (Chan, Golub and LeVeque 1983), the counts those of Epicoco et al. (IEEE Access 8,
 /// 2020).

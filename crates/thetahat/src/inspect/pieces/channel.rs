@@ -1,7 +1,7 @@
 //! The quality of one channel, in one pass.
 
 use super::counts::Counts;
-use super::far::{Distances, MOST};
+use super::far::Distances;
 use crate::inspect::saturation::{NEAR, crowded};
 use crate::inspect::{ChannelQuality, Saturation, channel::NAMED, moments, quantization};
 use crate::regression::sum;
@@ -22,7 +22,11 @@ pub(super) struct ChannelTotals {
     lowest: Vec<Level>,
     highest: Vec<Level>,
     spread: Spread,
-    values: Counts,
+    /// The different values, while they are not too many.
+    values: Option<Counts>,
+    most: usize,
+    /// Whether those that were too many were rounded to a step.
+    rounded: bool,
     distances: Distances,
 }
 
@@ -113,7 +117,7 @@ impl ChannelTotals {
     /// Of one channel of so many.
     pub(super) fn new(channels: usize) -> Self {
         // All of them together take some 50 MB at most, but for very many.
-        let most = ((1 << 20) / channels.max(1)).clamp(1 << 10, 1 << 16);
+        let most = ((1 << 20) / channels.max(1)).clamp(1 << 12, 1 << 16);
         Self {
             missing: 0,
             repeated: 0,
@@ -123,8 +127,10 @@ impl ChannelTotals {
             lowest: Vec::new(),
             highest: Vec::new(),
             spread: Spread::default(),
-            values: Counts::new(most),
-            distances: Distances::new((most / 4).max(1 << 10)),
+            values: Some(Counts::new(usize::MAX)),
+            most,
+            rounded: false,
+            distances: Distances::new(most / 4),
         }
     }
 
@@ -141,7 +147,9 @@ impl ChannelTotals {
             }
             there.push(value);
             times.push(elapsed(position));
-            self.values.push(value);
+            if let Some(values) = &mut self.values {
+                values.push(value);
+            }
             self.distances.push(value, first + position);
             match &mut self.run {
                 Some(run) if run.open && run.value == value => {
@@ -159,6 +167,14 @@ impl ChannelTotals {
         }
         if !there.is_empty() {
             self.spread.merge(&Spread::new(&times, &there));
+        }
+        if let Some(values) = &mut self.values {
+            values.settle();
+            if values.different() > self.most {
+                // Where some values are not rounded to any step, more of them are not either.
+                self.rounded = step(values).is_some();
+                self.values = None;
+            }
         }
     }
 
@@ -185,7 +201,6 @@ impl ChannelTotals {
         if let Some(run) = self.run {
             self.end(run, true);
         }
-        self.values.settle();
         let mut words = Vec::new();
         let mut quality = ChannelQuality {
             name: name.to_owned(),
@@ -207,12 +222,11 @@ impl ChannelTotals {
         let Some([minimum, maximum]) = self.range() else { return (quality, words) };
         (quality.minimum, quality.maximum) = (Some(minimum), Some(maximum));
         quality.saturation = self.saturation();
-        if self.values.is_exact() {
-            let distinct: Vec<f64> = self.values.values().map(|(value, _)| value).collect();
-            quality.quantization = quantization::quantization(&distinct);
-        } else {
+        quality.quantization = self.values.as_ref().and_then(step);
+        if self.rounded {
             words.push(format!(
-                "channel '{name}' has more different values than are kept: what it is rounded to is left out"
+                "channel '{name}' has more than {} different values: what it is rounded to is left out",
+                self.most
             ));
         }
         let spread = &self.spread;
@@ -229,7 +243,8 @@ impl ChannelTotals {
         quality.outliers = far.rows.iter().take(NAMED).map(|row| row + 1).collect();
         if far.more {
             words.push(format!(
-                "channel '{name}' has more than {MOST} values far from their neighbours: of these the farthest are counted"
+                "channel '{name}' has more than {} values far from their neighbours: of these the farthest are counted",
+                self.most / 4
             ));
         }
         (quality, words)
@@ -245,6 +260,12 @@ impl ChannelTotals {
         let (low, high) = rows(&self.lowest).zip(rows(&self.highest))?;
         (low + high > 0).then_some(Saturation { low, high })
     }
+}
+
+/// The step to which values are rounded.
+fn step(values: &Counts) -> Option<f64> {
+    let distinct: Vec<f64> = values.values().map(|(value, _)| value).collect();
+    quantization::quantization(&distinct)
 }
 
 /// Counts a run among the levels nearest to a limit: one that is pushed out by nearer ones never comes back.

@@ -1,7 +1,8 @@
 //! How often each value is there, in bounded memory.
 
-/// This many values wait to be counted.
+/// At most this many values wait to be counted, and no more than this for each that is kept.
 const WAITING: usize = 1 << 16;
+const FOR_EACH: usize = 4;
 
 /// The values of a signal and how often each is there: exact while they are few, else rounded to as many bits as there is room for.
 ///
@@ -31,7 +32,7 @@ impl Counts {
     /// A value that is there.
     pub(in crate::inspect) fn push(&mut self, value: f64) {
         self.waiting.push(place(value));
-        if self.waiting.len() >= WAITING {
+        if self.waiting.len() >= WAITING.min(FOR_EACH.saturating_mul(self.most)) {
             self.settle();
         }
     }
@@ -90,6 +91,11 @@ impl Counts {
             before += count;
             (position < before).then_some(value)
         })
+    }
+
+    /// How many different ones there are.
+    pub(in crate::inspect) fn different(&self) -> usize {
+        self.cells.len()
     }
 
     /// How many there are.

@@ -3,12 +3,9 @@
 use super::counts::Counts;
 use crate::inspect::outliers::{FEWEST, HALF, NORMAL_SIZE, ORDINARY, THRESHOLD, WINDOW, distance};
 
-/// This many of the largest distances are kept.
-pub(super) const MOST: usize = 1 << 14;
-
 /// What [`outliers`](crate::inspect::outliers::outliers) asks of a signal: the distances of its values from the median of the seven around
 /// them, its changes, and the largest of both. The limit follows from two quantiles, which are exact to 2^-10 or better (see [`Counts`]); all
-/// else is as in one piece, while no more than [`MOST`] values are beyond it.
+/// else is as in one piece, while no more values are beyond it than there is room for.
 #[derive(Debug)]
 pub(in crate::inspect) struct Distances {
     /// The last values that are there, and their rows.
@@ -36,6 +33,7 @@ pub(in crate::inspect) struct Far {
 }
 
 impl Distances {
+    /// With room for this many values of each kind.
     pub(in crate::inspect) fn new(most: usize) -> Self {
         Self {
             window: Vec::with_capacity(WINDOW),
@@ -43,9 +41,9 @@ impl Distances {
             distances: Counts::new(most),
             changes: Counts::new(most),
             last: None,
-            farthest: Largest::default(),
+            farthest: Largest::new(most),
             range: [f64::INFINITY, f64::NEG_INFINITY],
-            pairs: Largest::default(),
+            pairs: Largest::new(most),
             largest_change: 0.0,
         }
     }
@@ -119,27 +117,27 @@ impl Distances {
 /// The items of the largest keys.
 #[derive(Debug)]
 struct Largest<T> {
+    most: usize,
     kept: Vec<(f64, T)>,
     /// The largest key of those that were let go.
     left: f64,
 }
 
-impl<T> Default for Largest<T> {
-    fn default() -> Self {
-        Self { kept: Vec::new(), left: f64::NEG_INFINITY }
-    }
-}
-
 impl<T: Copy> Largest<T> {
+    /// Room for this many.
+    fn new(most: usize) -> Self {
+        Self { most, kept: Vec::new(), left: f64::NEG_INFINITY }
+    }
+
     /// Keeps an item, or lets it or others go.
     fn push(&mut self, key: f64, item: T, mut let_go: impl FnMut(T)) {
         if key <= self.left {
             return let_go(item);
         }
         self.kept.push((key, item));
-        if self.kept.len() == 2 * MOST {
-            self.kept.select_nth_unstable_by(MOST, |(left, _), (right, _)| right.total_cmp(left));
-            for (key, item) in self.kept.drain(MOST..) {
+        if self.kept.len() >= 2 * self.most {
+            self.kept.select_nth_unstable_by(self.most, |(left, _), (right, _)| right.total_cmp(left));
+            for (key, item) in self.kept.drain(self.most..) {
                 self.left = self.left.max(key);
                 let_go(item);
             }

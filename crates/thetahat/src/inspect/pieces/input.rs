@@ -1,5 +1,7 @@
 //! What one input excites, and which inputs are the same, in one pass.
 
+use std::slice;
+
 use super::part::Part;
 use crate::inspect::spectrum::Periodograms;
 use crate::inspect::{Excitation, excitation, moments};
@@ -34,8 +36,8 @@ impl InputTotals {
         let level = moments::mean_of(|| inside().map(|value| scale * value));
         let samples = moments::samples(&segments);
         let highest = if samples > 0 { excitation::highest(&segments) } else { excitation::HIGHEST };
-        let whole = [0..part.log.rows()];
-        let windows = if samples > 0 { &segments[..] } else { &whole };
+        let whole = 0..part.log.rows();
+        let windows = if samples > 0 { &segments[..] } else { slice::from_ref(&whole) };
         Self {
             scale,
             level,

@@ -274,6 +274,25 @@ fn counts_are_exact_while_there_is_room_and_close_beyond() {
 }
 
 #[test]
+fn a_channel_of_too_many_values_says_so_where_it_is_rounded() {
+    let rows = 140_000;
+    let smooth: Vec<f64> = (0..rows).map(|row| (0.37 * f64::from(row)).sin()).collect();
+    let counted: Vec<f64> = (0..rows).map(|row| 0.25 * f64::from(row * 7919 % rows)).collect();
+    let stepped: Vec<f64> = counted.iter().map(|value| value % 16.0).collect();
+    let channels = vec![("smooth", smooth), ("counted", counted), ("stepped", stepped)];
+    let [whole, pieces] = both(&channels, None, &plan(&[], None), &[70_000]);
+    let steps = |of: &Inspection| of.channels.iter().map(|channel| channel.quantization).collect::<Vec<_>>();
+    assert_eq!(steps(&whole), [None, Some(0.25), Some(0.25)]);
+    assert_eq!(steps(&pieces), [None, None, Some(0.25)]);
+    let words: Vec<&String> =
+        pieces.warnings.iter().filter(|words| words.contains("different values")).collect();
+    assert_eq!(
+        words,
+        ["channel 'counted' has more than 65536 different values: what it is rounded to is left out"]
+    );
+}
+
+#[test]
 fn outliers_are_those_of_the_whole_while_they_are_few() {
     let jumps: Vec<f64> = (0..5000).map(|row| f64::from(row / 500 % 2) * 50.0).collect();
     let mut stepped = sum_of(&jumps, 0.1, &normal(31, 5000));
@@ -289,4 +308,15 @@ fn outliers_are_those_of_the_whole_while_they_are_few() {
         assert_eq!(far.rows, outliers::outliers(&signal));
         assert!(!far.more);
     }
+    // There is room for the farthest only.
+    let spiky: Vec<f64> = normal(35, 5000)
+        .iter()
+        .enumerate()
+        .map(|(row, x)| if row % 100 == 9 { 50.0 + row as f64 } else { *x })
+        .collect();
+    let mut distances = Distances::new(20);
+    spiky.iter().enumerate().for_each(|(row, value)| distances.push(*value, row));
+    let far = distances.finish();
+    assert!(far.more && (20..40).contains(&far.rows.len()) && far.rows.iter().all(|row| row % 100 == 9));
+    assert_eq!(far.rows.last(), Some(&4909));
 }

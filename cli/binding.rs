@@ -83,7 +83,7 @@ pub fn pieces(options: &[OsString], inputs: Vec<String>, outputs: Vec<String>) -
     let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
     let job = PiecesJob::resolve(&arguments("fit", &words)?, outputs.len() > 1)?;
     let inputs = if job.is_driven() { inputs } else { Vec::new() };
-    if inputs.is_empty() && job.is_driven() {
+    if inputs.is_empty() && job.needs_inputs() {
         return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
     }
     job.making(Channels { inputs, outputs }).map(|(_, making)| making)

@@ -103,6 +103,20 @@ fn several_outputs_are_of_one_pass_too() {
 }
 
 #[test]
+fn products_are_of_one_pass_too() {
+    let folder = Folder::new();
+    let Experiment { u, mut y, .. } = Experiment::new(400_000);
+    y[300_000] = f64::NAN;
+    folder.write("log.csv", csv(&[("u", &u), ("y", &y)]));
+    let model = "--narx poly --ny 2 --nu 2 --term 1 --term y(k-1) --term y(k-2) --term u(k-1) --term u(k-2) --term y(k-1)*u(k-1)^2";
+    let whole = folder.fit(&format!("log.csv {model}"));
+    let stream = folder.fit(&format!("log.csv {model} --stream"));
+    assert!(deviation(&whole, &stream) < 1e-12);
+    assert_eq!(stream["estimation"]["samples"], whole["estimation"]["samples"]);
+    assert!((number(&whole, "/estimation/mse") / number(&stream, "/estimation/mse") - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn a_plant_that_rests_for_long_is_no_piece_given_twice() {
     let Experiment { mut u, mut y, .. } = Experiment::new(2000);
     u.resize(ROWS * 2, 3.0);
@@ -126,6 +140,10 @@ fn what_one_pass_cannot_do_is_refused() {
         ("log.csv --model ss --order 2", 2, "--stream is for ARX"),
         ("other.csv --input u2 --output u1,y --na 1 --nb 1 --nk 1..3", 2, "nk"),
         ("other.csv --input u2 --output u1,y", 2, "--stream is for ARX"),
+        ("log.csv --narx poly", 2, "name the products"),
+        ("log.csv --narx rbf", 2, "found from the samples"),
+        ("other.csv --input u2 --output u1,y --narx poly --term 1", 2, "one output"),
+        ("log.csv --narx poly --term y(k-1) --html page.html", 2, "--html"),
         ("log.csv --na 2 --nb 2 --html page.html", 2, "--html"),
         ("log.csv --na 2 --nb 2 --split 60/20/20", 2, "all rows of a piece"),
         ("log.csv --na 2 --nb 2 --detrend linear", 2, "mean or none"),

@@ -68,7 +68,7 @@ fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
     if let Some(model) = &arguments.grey {
         return Ok(Resolved::GreyBox(Box::new(GreyBoxJob::resolve(arguments, model)?)));
     }
-    if let Some(map) = arguments.narx.narx {
+    if let Some(map) = arguments.narx.narx.filter(|_| !arguments.stream) {
         return Ok(Resolved::Narx(Box::new(NarxJob::resolve(arguments, map)?)));
     }
     if let Some(job) = ProcessJob::resolve(arguments)? {

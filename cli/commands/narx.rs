@@ -8,11 +8,14 @@ use crate::failure::Failure;
 use crate::job::NarxJob;
 use crate::log;
 
+/// The columns that the model wants.
+pub(super) fn wanted(job: &NarxJob) -> Wanted<'_> {
+    Wanted { inputs: job.inputs.as_deref(), outputs: &job.outputs, driven: job.driven, none: "--nu 0" }
+}
+
 /// Reads the logs and fits the model.
 pub(super) fn found(job: &NarxJob, telling: &Telling) -> Result<Identified, Failure> {
-    let wanted =
-        Wanted { inputs: job.inputs.as_deref(), outputs: &job.outputs, driven: job.driven, none: "--nu 0" };
-    let found = read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
+    let found = read(&job.paths, &job.log, &wanted(job), false, |_| Ok(()))?;
     found.words.iter().for_each(|word| telling.warn(word));
     let plan = job.plan(found.channels.inputs, found.channels.outputs)?;
     let report =

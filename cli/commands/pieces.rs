@@ -9,10 +9,10 @@ use thetahat::select::Choice;
 
 use super::experiments::{Channels, Wanted, wanted};
 use super::search::{Identified, Telling};
-use super::state_space;
+use super::{narx, state_space};
 use crate::args::FitArguments;
 use crate::failure::Failure;
-use crate::job::{FitJob, LogJob, StateSpaceJob};
+use crate::job::{FitJob, LogJob, NarxJob, StateSpaceJob};
 use crate::log::{self, Piece};
 
 /// A model whose normal equations are sums over parts of the logs.
@@ -20,6 +20,7 @@ pub(crate) enum PiecesJob {
     Linear(Box<FitJob>),
     /// With several outputs.
     VectorArx(Box<StateSpaceJob>),
+    NonlinearArx(Box<NarxJob>),
 }
 
 /// Makes the normal equations of a part, which begins with so many rows of the one before it.
@@ -28,12 +29,15 @@ pub type Making = Box<dyn Fn(&Log, &[Source], usize) -> Result<NormalEquations, 
 impl PiecesJob {
     /// A log that is there already may have several outputs without their names.
     pub(crate) fn resolve(arguments: &FitArguments, has_several: bool) -> Result<Self, Failure> {
+        if let Some(map) = arguments.narx.narx {
+            return Ok(Self::NonlinearArx(Box::new(NarxJob::resolve(arguments, map)?)));
+        }
         if let Some(job) = StateSpaceJob::resolve(arguments, has_several)? {
             return if job.is_arx() {
                 Ok(Self::VectorArx(Box::new(job)))
             } else {
                 Err(Failure::usage(
-                    "--stream is for ARX and AR models and impulse responses: the states of a subspace method are evaluated on the log, \
+                    "--stream is for ARX and AR models, nonlinear ones of products that are named, and impulse responses: the states of a subspace method are evaluated on the log, \
                      which is not read again; leave it out",
                 ))
             };
@@ -47,6 +51,7 @@ impl PiecesJob {
         match self {
             Self::Linear(job) => (&job.paths, &job.log),
             Self::VectorArx(job) => (&job.paths, &job.log),
+            Self::NonlinearArx(job) => (&job.paths, &job.log),
         }
     }
 
@@ -54,6 +59,7 @@ impl PiecesJob {
         match self {
             Self::Linear(job) => wanted(job),
             Self::VectorArx(job) => state_space::wanted(job),
+            Self::NonlinearArx(job) => narx::wanted(job),
         }
     }
 
@@ -88,7 +94,20 @@ impl PiecesJob {
                 };
                 (lags, Box::new(made))
             }
+            Self::NonlinearArx(job) => {
+                let plan = job.plan(channels.inputs, channels.outputs)?;
+                let lags = plan.lags();
+                let made = move |log: &Log, sources: &[Source], past| {
+                    NormalEquations::of_nonlinear_arx(log, sources, &plan, past)
+                };
+                (lags, Box::new(made))
+            }
         })
+    }
+
+    /// Whether a model of these orders has to have inputs: products are of what there is.
+    pub(crate) fn needs_inputs(&self) -> bool {
+        self.is_driven() && !matches!(self, Self::NonlinearArx(_))
     }
 
     /// Whether there is one model to be made.

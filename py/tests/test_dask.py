@@ -169,6 +169,14 @@ def test_one_model_of_several_outputs(client: Any) -> None:
         thetahat.dask.normal_equations({"a": log[:500], "b": log[500:].select(output="y1")}, **orders).compute()
 
 
+def test_one_nonlinear_model(client: Any) -> None:
+    orders: dict[str, Any] = {"terms": ["1", "y(k-1)", "y(k-2)", "u(k-1)", "y(k-1)*u(k-1)"], "ny": 2, "nu": 1}
+    pieces = [MOTOR[first : first + 100] for first in range(0, 1000, 100)]
+    found, whole = thetahat.dask.normal_equations(pieces, **orders).compute().solve(), th.narx(MOTOR, **orders)
+    np.testing.assert_allclose(found.parameters, whole.parameters, rtol=1e-11, atol=1e-12)
+    assert found.samples == whole.samples == 998
+
+
 def test_pieces_that_cannot_be_meant_are_refused(client: Any) -> None:
     one, two = MOTOR[:500].to_pandas().reset_index(names="t"), MOTOR[500:].to_pandas().reset_index(names="t")
     read = {"inputs": "u", "output": "y", "time": "t"}

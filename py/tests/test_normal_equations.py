@@ -145,6 +145,41 @@ def test_several_outputs(two: th.Log, orders: dict[str, Any]) -> None:
     assert repr(both).endswith("2000 rows in 2 pieces, inputs u1, u2, outputs y1, y2)")
 
 
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"raw_terms": True, "detrend": "none"},
+        {"regressors": ["sqrt(abs(u1))"], "offset": {"y": 49.0}},
+    ],
+)
+def test_products_of_a_nonlinear_model(log: th.Log, options: dict[str, Any]) -> None:
+    terms = ["1", "y(k-1)", "y(k-2)", "u1(k-1)", "u1(k-2)", "u2(k-3)", "u1(k-1)^2*u2(k-2)", "y(k-1)*u1(k-2)"]
+    terms += ["sqrt(abs(u1))(k-1)"] if "regressors" in options else []
+    orders: dict[str, Any] = {"terms": terms, "ny": 2, "nu": 3, **options}
+    sums = [th.NormalEquations(log[max(0, first - 3) : first + 1000], past=min(first, 3), **orders) for first in (0, 1000, 2000)]
+    found, whole = (sums[0] | pickle.loads(pickle.dumps(sums[1] | sums[2]))).solve(), th.narx(log, **orders)
+    digits = 1e-12 if options.get("detrend") is None else 1e-8  # offsets that are left take digits from the fit in one pass
+    np.testing.assert_allclose(found.parameters, whole.parameters, rtol=digits, atol=digits)
+    np.testing.assert_allclose(found.standard_errors, whole.standard_errors, rtol=digits)
+    assert found.parameter_names == whole.parameter_names and found.samples == whole.samples
+    assert found.kind == "nonlinear-arx"
+    for name, offset in whole.offsets.items():
+        assert found.offsets[name] == pytest.approx(offset, rel=1e-12)
+    assert repr(sums[0]).startswith(f"NormalEquations(NARX polynomial, {len(terms)} terms, 1000 rows in 1 piece, inputs u1, u2")
+    np.testing.assert_allclose(found.predict(log), whole.predict(log), rtol=1e-9, equal_nan=True)
+
+
+def test_products_of_other_kinds_are_refused(log: th.Log, two: th.Log) -> None:
+    with pytest.raises(TypeError, match="terms: expected a sequence of str"):
+        th.NormalEquations(log, terms="y(k-1)")
+    with pytest.raises(ValueError, match="output: pieces make nonlinear models of one output"):
+        th.NormalEquations(two, terms=["y1(k-1)"])
+    with pytest.raises(ValueError, match="other products"):
+        th.NormalEquations(log[:999], terms=["y(k-1)"]).merge(th.NormalEquations(log[999:], terms=["y(k-2)"]))
+
+
 def test_several_outputs_without_inputs(two: th.Log) -> None:
     sums = th.NormalEquations(two, na=2)
     assert repr(sums) == "NormalEquations(ARX(2) with 2 outputs, 2000 rows in 1 piece, no inputs, outputs y1, y2)"
@@ -207,9 +242,14 @@ def test_what_makes_no_piece_is_refused(log: th.Log) -> None:
         ({"na": 2, "nb": 2, "past": 1}, "past: 1 rows are fewer than the 2"),
         ({"na": 2, "nb": 2, "past": 3000}, "past: all 3000 rows of the piece"),
         ({"na": 2, "nb": 2, "past": -1}, "past: -1 is below 0"),
-        ({}, "na: give the orders na and nb, or taps"),
+        ({}, "na: give the orders na and nb, or taps, or terms"),
         ({"na": 2, "taps": 10}, "taps: an impulse response has neither na nor nb"),
         ({"na": 2, "nk": 1}, "nk: it is for inputs"),
+        ({"na": 2, "ny": 1}, "ny: it is for products; give terms too"),
+        ({"na": 2, "terms": ["y(k-1)"]}, "na: it is not of nonlinear models"),
+        ({"terms": []}, "terms: there is none"),
+        ({"terms": ["y(k-9)"]}, "y.k-9."),
+        ({"terms": ["y(k-1)"], "detrend": "linear"}, "detrend: what is taken"),
         ({"na": 2, "nb": 2, "detrend": "linear"}, "detrend: what is taken"),
         ({"na": 2, "nb": 2, "offset": {"w": 1.0}}, "'w' is neither an input nor the output"),
         ({"na": range(1, 3), "nb": 2}, "orders: pieces of a log make one model"),

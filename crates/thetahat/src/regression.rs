@@ -22,11 +22,11 @@ pub(crate) mod noise;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use extended::{Column, ExtendedGram};
+pub(crate) use extended::{Column, DividedMonomials, ExtendedGram};
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
-pub(crate) use forward::{Path, forward};
+pub(crate) use forward::{Chosen as ChosenTerm, Path, forward};
 pub(crate) use gram::{Interior, Products, gram, joint_gram};
-pub(crate) use kernel::{extended_sum, largest, product, sum, sum_of_squares};
+pub(crate) use kernel::{extended_product, extended_sum, largest, product, sum, sum_of_squares};
 pub(crate) use lagged::{Lagged, Presample, Taps};
 pub(crate) use lagged_moments::LaggedMoments;
 pub(crate) use monomials::{Moments, Monomials};

@@ -9,7 +9,8 @@ from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import FitOptions, Order, Orders
+from thetahat._narx import Lags
+from thetahat._options import FitOptions, NarxOptions, Order, Orders
 
 
 class NormalEquations:
@@ -42,6 +43,15 @@ class NormalEquations:
         In place of na and nb: how many values the impulse response of a finite one has.
     kernel : {"dc", "tc"} or None, default "dc"
         What is known of that response, see `fir`.
+    terms : sequence of str, optional
+        In place of na and nb: the products of a nonlinear ARX model with one output, as `thetahat.narx` writes them, such as
+        ``["1", "y(k-1)", "y(k-1)*u(k-1)^2"]``.
+    ny, nu : int, optional
+        With terms: how many values of the output and of each input these read, 2 unless it is said.
+    regressors : sequence of str, optional
+        With terms: expressions of the channels that these read too, see `thetahat.NarxOptions`.
+    raw_terms : bool, default False
+        With terms: whether signals keep their own units; else each is divided by its standard deviation over all pieces.
     couple : {"full", "none", "auto"}, optional
         With several outputs: whether an output depends on the past of all or of its own, see `arx`.
     detrend : {"mean", "none"}, optional
@@ -93,12 +103,33 @@ class NormalEquations:
         past: int = 0,
         taps: int | Sequence[int] | None = None,
         kernel: str | None = "dc",
+        terms: Sequence[str] | None = None,
+        ny: Lags | None = None,
+        nu: Lags | None = None,
+        regressors: Sequence[str] | None = None,
+        raw_terms: bool = False,
         couple: str | None = None,
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
         constant: str | None = None,
     ) -> None:
         data = handle("log", log)
+        if terms is not None:
+            others: dict[str, Any] = {"na": na, "nb": nb, "taps": taps, "couple": couple, "constant": constant}
+            for name, value in others.items():
+                if value is not None:
+                    raise ValueError(f"{name}: it is not of nonlinear models, whose products are named; leave it or the terms out")
+            if isinstance(terms, str) or not isinstance(terms, Sequence):
+                raise TypeError(f"terms: expected a sequence of str, found {terms!r}")
+            words = ["--narx=poly", *_options.order_words(ny=ny, nu=nu, nk=nk)]
+            own = {"terms": list(terms), "regressors": regressors, "raw_terms": raw_terms, "detrend": detrend, "offset": offset}
+            words += _options.words(NarxOptions, own)
+            self._sums = _thetahat.NormalEquations(data, words, _past(past))
+            return
+        products: dict[str, Any] = {"ny": ny, "nu": nu, "regressors": regressors, "raw_terms": raw_terms or None}
+        for name, value in products.items():
+            if value is not None:
+                raise ValueError(f"{name}: it is for products; give terms too, or leave it out")
         several = len(log.outputs) > 1
         if taps is not None and several:
             raise ValueError(f"taps: an impulse response has one output, and the log {len(log.outputs)}; take it with log.select(output=...)")
@@ -110,7 +141,7 @@ class NormalEquations:
             named = "none" if kernel is None else _options.text("kernel", kernel)
             words = ["--model=fir", *_options.order_words(taps=taps, nk=0 if nk is None else nk), f"--kernel={named}"]
         elif na is None and nb is None:
-            raise ValueError("na: give the orders na and nb, or taps")
+            raise ValueError("na: give the orders na and nb, or taps, or terms")
         elif nb is None:
             if nk is not None:
                 raise ValueError("nk: it is for inputs; give nb too, or leave it out")
@@ -120,9 +151,7 @@ class NormalEquations:
             words = ["--model=arx", *orders]
         words += [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
         words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
-        if _options.integer("past", past) < 0:
-            raise ValueError(f"past: {past} is below 0")
-        self._sums = _thetahat.NormalEquations(data, words, past)
+        self._sums = _thetahat.NormalEquations(data, words, _past(past))
 
     @classmethod
     def _of(cls, sums: _thetahat.NormalEquations) -> NormalEquations:
@@ -224,3 +253,9 @@ class NormalEquations:
         driven += f", output{'' if len(outputs) == 1 else 's'} {', '.join(outputs)}"
         pieces = f"{self.pieces} piece{'' if self.pieces == 1 else 's'}"
         return f"NormalEquations({self._sums.name()}, {self.rows} rows in {pieces}, {driven})"
+
+
+def _past(past: int) -> int:
+    if _options.integer("past", past) < 0:
+        raise ValueError(f"past: {past} is below 0")
+    return past

@@ -373,8 +373,12 @@ def _shared() -> Iterator[None]:
         _thetahat.threads(before)
 
 
-def _lags(na: Any = 0, nb: Any = 0, nk: Any = None, taps: Any = None, **_: Any) -> int:
+def _lags(
+    na: Any = 0, nb: Any = 0, nk: Any = None, taps: Any = None, terms: Any = None, ny: Any = None, nu: Any = None, **_: Any
+) -> int:
     """How many rows the model reaches back to, at most. Orders are numbers, ranges, or one of these for each input."""
+    if terms is not None:
+        na, nb = 2 if ny is None else ny, 2 if nu is None else nu
     first = (0 if taps is not None else 1) if nk is None else _largest(nk)
     count = _largest(nb if taps is None else taps)
     return max(_largest(na), first + count - 1 if count else 0)

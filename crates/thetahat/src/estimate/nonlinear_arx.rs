@@ -7,6 +7,7 @@ mod joint;
 mod local;
 mod neighbours;
 pub(crate) mod splines;
+mod sums;
 mod training;
 
 use faer::linalg::matmul::matmul;
@@ -21,6 +22,7 @@ pub use figures::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutco
 use figures::{Sums, run};
 pub(crate) use joint::{Joint, joint};
 pub(crate) use local::Growth;
+pub(crate) use sums::of_sums;
 pub(crate) use training::{Training, Units};
 
 use super::{Criteria, InformationCriterion};
@@ -420,13 +422,9 @@ impl<'l> Samples<'l> {
         let each = path.chosen.par_iter().zip(held_out).enumerate().map(|(at, (chosen, held_out))| {
             let run = || RunFigures::of(&self.on_path(candidates, path, at + 1), self.log, &rows);
             Ok(TermStep {
-                term: candidates.name(chosen.place, &names),
-                parameters: at + 1,
-                error_reduction: chosen.reduction,
-                aliases: chosen.aliases.iter().map(|place| candidates.name(*place, &names)).collect(),
-                rmse: (path.left(at + 1).max(0.0) * variance).sqrt(),
                 free_run: (at + 1 >= candidates.always()).then(run).transpose()?,
                 held_out: *held_out,
+                ..TermStep::of(candidates, &names, chosen, at + 1, path.left(at + 1) * variance)
             })
         });
         each.collect()
@@ -484,14 +482,7 @@ impl<'l> Samples<'l> {
         let names: Vec<String> = self.head.regressors.iter().map(|one| one.name()).collect();
         let names = map.names(&names);
         if self.rows.len() <= count {
-            return Err(Error::undetermined(
-                Vec::new(),
-                format!(
-                    "{count} functions need more than {count} samples with all regressors, there are {}; take fewer functions, or more \
-                     rows",
-                    self.rows.len()
-                ),
-            ));
+            return Err(too_few(count, self.rows.len()));
         }
         let evaluator = Evaluator::new(&map, vec![0.0; count]);
         let mut values = vec![0.0; (count + 1) * self.rows.len()];
@@ -526,13 +517,7 @@ impl<'l> Samples<'l> {
             if column < count { value / sizes[column] } else { value }
         };
         let failed = |error: CoreError| match error {
-            CoreError::RankDeficient { column } => Error::undetermined(
-                vec![names[column].clone()],
-                format!(
-                    "{} is a sum of the other functions on the estimation rows; leave one of them out",
-                    names[column]
-                ),
-            ),
+            CoreError::RankDeficient { column } => is_dependent(&names[column]),
             error => Error::data(format!(
                 "the regression cannot be solved: {error}; take a lower degree or fewer functions"
             )),
@@ -580,6 +565,25 @@ impl<'l> Samples<'l> {
             },
         })
     }
+}
+
+/// There are not more samples than functions.
+fn too_few(functions: usize, samples: usize) -> Error {
+    Error::undetermined(
+        Vec::new(),
+        format!(
+            "{functions} functions need more than {functions} samples with all regressors, there are {samples}; take fewer functions, or more \
+             rows"
+        ),
+    )
+}
+
+/// A function that the others tell.
+fn is_dependent(name: &str) -> Error {
+    Error::undetermined(
+        vec![name.to_owned()],
+        format!("{name} is a sum of the other functions on the estimation rows; leave one of them out"),
+    )
 }
 
 /// The sums of several sets of rows together; none of none.

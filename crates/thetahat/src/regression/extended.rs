@@ -16,6 +16,8 @@
 //! Source: Björck, Numerical Methods for Least Squares Problems, 1996, sections 2.2 and 2.8 (normal equations, and their accumulation in
 //! higher precision); Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971).
 
+mod monomials;
+
 use faer::fx128;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -26,6 +28,7 @@ use super::gram::Products;
 use super::lagged::{Lagged, Taps};
 use super::solve::{Regression, SAFE_NORMS, Solver, Unsolved};
 use super::total::Total;
+pub(crate) use monomials::DividedMonomials;
 
 /// What rounding leaves of the square of a column that depends on others, of unit norm.
 const ROUNDING: f64 = 1e-28;

@@ -6,10 +6,10 @@ mod plan;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use super::evaluate::evaluate;
-use super::schema::{Estimation, Report};
+use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Channel, Log, Offset, Rows, Source};
 use crate::estimate::{
@@ -31,7 +31,7 @@ use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
 /// Below this fraction of a channel's size, what an offset leaves is rounding.
-const ROUNDING: f64 = 1e-13;
+pub(super) const ROUNDING: f64 = 1e-13;
 
 /// Fits a nonlinear ARX model,
 ///
@@ -114,7 +114,8 @@ fn fit_planned(
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let expressions = plan.read_expressions()?;
     let Prepared { whole, signals, deviations } = prepare(log, plan, &expressions, &shares.estimation)?;
-    let head = head(&whole, plan, &signals, &deviations, &expressions, &shares.estimation)?;
+    let scales = scales(&whole, &signals, &deviations, plan.raw_terms, &shares.estimation)?;
+    let head = head(plan, &signals, &expressions, whole.sample_time(), scales)?;
     let fitted = (0..plan.outputs.len())
         .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares, monitor))
         .collect::<Result<Vec<_>, Error>>()?;
@@ -133,18 +134,42 @@ fn fit_planned(
     let (maps, parts) = fitted.into_iter().map(|one| (one.outcome, (one.samples, one.solved))).unzip();
     let joint = joint(&head.inputs, parts)
         .ok_or_else(|| Error::argument("output", "a model has one output at least"))?;
-    let Joint { mut model, mse, determinant, condition } = joint;
-
     let segments = deviations.segments(&names, &shares.estimation)?;
     let segments = segments.iter().map(Rows::from_positions).collect();
     let data = shares.into_data((log, sources), &names, plan.detrend.to_string(), segments)?;
-    let held_out: Vec<Rows> = data.held_out().into_iter().flat_map(|(_, rows)| rows).collect();
+    let Reported { mut report, mut model } =
+        reported(joint, by(MapsOutcome { maps }), (parameters, samples), data);
+    let held_out: Vec<Rows> = report.data.held_out().into_iter().flat_map(|(_, rows)| rows).collect();
     if !held_out.is_empty() {
         let errors = NonlinearArxOnLog::new(&model, &deviations, &held_out)?.run_errors();
         model.maps.iter_mut().zip(errors).for_each(|(map, errors)| map.run_errors = errors);
+        report.model = Model::from(model.clone());
     }
+    let on_log = |rows: &[Rows]| NonlinearArxOnLog::new(&model, &deviations, rows);
+    let own = on_log(&report.data.estimation)?;
+    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
+    for (part, rows) in report.data.held_out() {
+        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
+    }
+    report.warnings.extend(warnings(&report, &model));
+    Ok(report)
+}
+
+/// A report without figures and warnings, and its model.
+pub(super) struct Reported {
+    pub(super) report: Report,
+    pub(super) model: NonlinearArxModel,
+}
+
+/// Of a model with so many parameters that was found from so many samples.
+pub(super) fn reported(
+    Joint { model, mse, determinant, condition }: Joint,
+    procedure: Procedure,
+    (parameters, samples): (usize, usize),
+    data: Data,
+) -> Reported {
     let estimation = Estimation {
-        procedure: by(MapsOutcome { maps }),
+        procedure,
         initial: None,
         level: None,
         slope: None,
@@ -153,7 +178,7 @@ fn fit_planned(
         criteria: Criteria::new(determinant, parameters, samples),
         condition,
     };
-    let mut report = Report {
+    let report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
@@ -163,14 +188,7 @@ fn fit_planned(
         fit: Vec::new(),
         warnings: Vec::new(),
     };
-    let on_log = |rows: &[Rows]| NonlinearArxOnLog::new(&model, &deviations, rows);
-    let own = on_log(&report.data.estimation)?;
-    evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
-    for (part, rows) in report.data.held_out() {
-        evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
-    }
-    report.warnings.extend(warnings(&report, &model));
-    Ok(report)
+    Reported { report, model }
 }
 
 /// A log with the expressions of the plan as further channels.
@@ -197,17 +215,7 @@ fn prepare<'l>(
             "no estimation row has a value in every channel; name other rows or channels",
         ));
     }
-    let mut whole = Cow::Borrowed(log);
-    let channels = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
-    let channels: Vec<&[f64]> = channels.collect::<Result<_, Error>>()?;
-    for (text, expression) in plan.expressions.iter().zip(expressions) {
-        let mut values = expression.along(&channels, &vec![0.0; channels.len()]);
-        if let Some(row) = segments.iter().cloned().flatten().find(|row| !values[*row].is_finite()) {
-            return Err(no_number(text, row));
-        }
-        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f64::NAN);
-        whole = Cow::Owned(whole.into_owned().with_channel(Channel { name: text.clone(), values }));
-    }
+    let whole = with_expressions(log, plan, expressions, &segments)?;
     let mut signals = BTreeMap::new();
     for name in names.iter().copied().chain(plan.expressions.iter().map(String::as_str)) {
         let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
@@ -222,19 +230,39 @@ fn prepare<'l>(
     Ok(Prepared { whole, signals, deviations })
 }
 
-/// The model but its functions: signals, regressors and scales.
-fn head(
-    log: &Log,
+/// The log with the values of the expressions as further channels, which have to be numbers in these segments.
+pub(super) fn with_expressions<'l>(
+    log: &'l Log,
     plan: &NonlinearArxPlan,
-    signals: &BTreeMap<String, Signal>,
-    deviations: &Log,
     expressions: &[ChannelExpression],
+    segments: &[Range<usize>],
+) -> Result<Cow<'l, Log>, Error> {
+    let mut whole = Cow::Borrowed(log);
+    let names: Vec<&str> = plan.channels().collect();
+    let channels = names.iter().map(|name| Ok(log.channel(name)?.values.as_slice()));
+    let channels: Vec<&[f64]> = channels.collect::<Result<_, Error>>()?;
+    for (text, expression) in plan.expressions.iter().zip(expressions) {
+        let mut values = expression.along(&channels, &vec![0.0; channels.len()]);
+        if let Some(row) = segments.iter().cloned().flatten().find(|row| !values[*row].is_finite()) {
+            return Err(no_number(text, row));
+        }
+        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f64::NAN);
+        whole = Cow::Owned(whole.into_owned().with_channel(Channel { name: text.clone(), values }));
+    }
+    Ok(whole)
+}
+
+/// What channels are divided by, each with its role: the standard deviation over the estimation rows; 1 in the signals' own units.
+fn scales<'l>(
+    log: &'l Log,
+    signals: &BTreeMap<String, Signal>,
+    deviations: &'l Log,
+    keeps_units: bool,
     estimation: &[Rows],
-) -> Result<NonlinearArxModel, Error> {
+) -> Result<impl Fn(&str, &str) -> Result<f64, Error> + use<'l>, Error> {
     let names: Vec<&str> = signals.keys().map(String::as_str).collect();
     let segments = deviations.segments(&names, estimation)?;
-    // The standard deviation over the estimation rows; 1 in the signals' own units.
-    let scale = |name: &str, role: &str| -> Result<f64, Error> {
+    Ok(move |name: &str, role: &str| -> Result<f64, Error> {
         let (own, raw) = (&deviations.channel(name)?.values, &log.channel(name)?.values);
         let of =
             |values: &[f64]| segments.iter().map(|rows| &values[rows.clone()]).collect::<Vec<_>>().concat();
@@ -250,16 +278,31 @@ fn head(
             )));
         }
         if spread.is_nan() || spread <= ROUNDING * size {
-            return Err(Error::undetermined(
-                Vec::new(),
-                format!(
-                    "{role} '{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes{}",
-                    if role == "output" { "" } else { ", or leave it out" }
-                ),
-            ));
+            return Err(is_constant(name, role));
         }
-        Ok(if plan.raw_terms { 1.0 } else { spread })
-    };
+        Ok(if keeps_units { 1.0 } else { spread })
+    })
+}
+
+/// A channel that does not change.
+pub(super) fn is_constant(name: &str, role: &str) -> Error {
+    let or = if role == "output" { "" } else { ", or leave it out" };
+    Error::undetermined(
+        Vec::new(),
+        format!(
+            "{role} '{name}' is constant over the estimation rows: it can determine nothing; name rows in which it changes{or}"
+        ),
+    )
+}
+
+/// The model but its functions: signals, regressors and their scales.
+pub(super) fn head(
+    plan: &NonlinearArxPlan,
+    signals: &BTreeMap<String, Signal>,
+    expressions: &[ChannelExpression],
+    sample_time: f64,
+    scale: impl Fn(&str, &str) -> Result<f64, Error>,
+) -> Result<NonlinearArxModel, Error> {
     let mut regressors: Vec<Regressor> = Vec::new();
     let mut read = |channel: &str, lags: std::ops::Range<usize>, scale: f64| {
         regressors.extend(lags.map(|lag| Regressor {
@@ -284,7 +327,7 @@ fn head(
     }
     let named = |names: &[String]| names.iter().map(|name| signals[name].clone()).collect();
     Ok(NonlinearArxModel {
-        sample_time: log.sample_time(),
+        sample_time,
         inputs: named(&plan.inputs),
         outputs: named(&plan.outputs),
         expressions: named(&plan.expressions),
@@ -298,7 +341,7 @@ fn head(
 }
 
 /// What a careful reader should know.
-fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
+pub(super) fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String> {
     let mut warnings = Vec::new();
     for ((outcome, map), output) in
         report.estimation.procedure.terms().iter().zip(&model.maps).zip(&model.outputs)

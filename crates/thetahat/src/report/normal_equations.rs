@@ -2,6 +2,7 @@
 
 mod border;
 mod linear;
+mod nonlinear_arx;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::Plan;
 use super::from_sums::one_step;
 use super::identify::{channels, estimation_rows};
+use super::nonlinear_arx::NonlinearArxPlan;
 use super::schema::{Data, Missing, Report};
 use super::state_space::StateSpacePlan;
 use super::totals::Totals;
@@ -26,6 +28,7 @@ use crate::respond::InitialCondition;
 use crate::validate::Fit;
 use crate::{Document, Error};
 use border::Border;
+use nonlinear_arx::{Centred, Products, Summed, summed};
 use settings::{Kind, Settings};
 
 /// The normal equations of a model that is linear in its parameters: made from a piece of the data, added to those of other pieces,
@@ -38,7 +41,8 @@ use settings::{Kind, Settings};
 /// and the sums of each channel hold all that a fit by least squares asks of the data: parameters and their covariance, the noise
 /// variance, the offsets that are taken from the channels (means that are known at the end only), whether a constant is worth its
 /// parameter, the fit one step ahead. So ARX and AR models, and impulse responses with a kernel or without, come out as
-/// [`identify`](super::identify()) finds them on the joined log.
+/// [`identify`](super::identify()) finds them on the joined log. ARX models with several outputs ([`of_states`](Self::of_states)) and nonlinear ones of
+/// products that are named ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
 ///
 /// Sums are in twice the precision, 32 digits, of which a condition number kappa takes 2 log10(kappa): parameters are exact to
 /// eps + 1e-29 kappa^2 (measured: 4e-16 up to kappa = 1e6), in whatever order pieces are merged. The difference to a fit in one pass is
@@ -85,7 +89,10 @@ pub struct NormalEquations {
     sample_time: f64,
     /// The sums of r r'.
     products: ExtendedGram,
-    /// Of each channel, the inputs first.
+    /// What these are about, where products are not of two signals alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    centred: Option<Centred>,
+    /// Of each channel, the inputs first, expressions last.
     channels: Vec<Totals>,
     /// The rows of all pieces, those of the past among them; and which of them are no past.
     rows: usize,
@@ -158,17 +165,46 @@ impl NormalEquations {
         let measured = log.segments(&names, &piece.own)?;
         let record = estimation_rows(log, plan, orders, &piece.own)?;
         let products = lagged_products(&record, orders)?;
-        Self::made(settings, &piece, products, (&record.segments, &measured))
+        let totals = Self::totals(&settings, &piece, (&record.segments, &measured))?;
+        Self::made(settings, &piece, (products, None), totals, &record.segments)
     }
 
     /// Those of an ARX model with several outputs.
     ///
     /// The plan says the channels, [`arx`](StateSpacePlan::arx), delays, offsets and constant as for
     /// [`fit_state_space`](super::fit_state_space()). Products of all lags of all signals are the normal equations of every order: orders and
-    /// coupling may be ranges, of which the least MDL chooses when the model is solved for.
+    /// coupling may be ranges, of which the least MDL chooses when the model is solved for. That is done as in a fit to the whole, in 16
+    /// digits: to eps kappa^2.
     ///
     /// # Errors
     /// As for [`new`](Self::new); [`Error::Argument`] for a plan without `arx`, and a range of delays, whose models are of other rows.
+    ///
+    /// ```
+    /// use thetahat::data::{Channel, Log, Rows};
+    /// use thetahat::estimate::{VectorArxInputs, VectorArxOptions};
+    /// use thetahat::report::{NormalEquations, StateSpacePlan, fit_state_space};
+    ///
+    /// let u: Vec<f64> = (0..400_u32).map(|t| f64::from(t * t % 7)).collect();
+    /// let (mut y, mut z) = (vec![0.0; 400], vec![0.0; 400]);
+    /// for t in 1..400 {
+    ///     let noise = 0.01 * f64::from(t as u32 * 11 % 13);
+    ///     y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 1] + noise;
+    ///     z[t] = 0.5 * z[t - 1] - 0.3 * y[t - 1] + noise * noise;
+    /// }
+    /// let channel = |name: &str, values| Channel { name: name.into(), values };
+    /// let log = Log::new(vec![channel("u", u), channel("y", y), channel("z", z)], 0.1)?;
+    /// let nb = VectorArxInputs::Alike(1..=2);
+    /// let arx = VectorArxOptions { na: 1..=2, nb, coupling: None, delay: 0..=0, direct: false, constant: false };
+    /// let plan = StateSpacePlan { arx: Some(arx), ..StateSpacePlan::new(&["u"], &["y", "z"]) };
+    /// let (names, lags) = (["u", "y", "z"], plan.lags());
+    /// let first = log.part(&names, Rows::new(1, 200)?)?;
+    /// let second = log.part(&names, Rows::new(201 - lags, 400)?)?;
+    /// let mut sums = NormalEquations::of_states(&first, &[], &plan, 0)?;
+    /// sums.merge(&NormalEquations::of_states(&second, &[], &plan, lags)?)?;
+    /// let (merged, whole) = (sums.solve()?.estimation, fit_state_space(&log, &[], &plan)?.estimation);
+    /// assert!((merged.mse / whole.mse - 1.0).abs() < 1e-9 && merged.samples == whole.samples);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
     pub fn of_states(
         log: &Log,
         sources: &[Source],
@@ -191,29 +227,89 @@ impl NormalEquations {
         let taps = joint_taps(delays, outputs.len(), arx.longest(delays.len()));
         let segments = Piece::with_past(&record, settings.lags());
         let products = joint_products(&signals, taps, &segments)?;
-        Self::made(settings, &piece, products, (&record.segments, &record.segments))
+        let totals = Self::totals(&settings, &piece, (&record.segments, &record.segments))?;
+        Self::made(settings, &piece, (products, None), totals, &record.segments)
     }
 
-    /// Of a piece in which the samples of these segments count for the offsets of inputs, and of outputs.
+    /// Those of a nonlinear ARX model of products that are named, [`MapPlan::Products`](super::MapPlan::Products), with one output.
+    ///
+    /// The plan says channels, lags, expressions, products, offsets and units as for [`fit_nonlinear_arx`](super::fit_nonlinear_arx()). The sums are of
+    /// the products and of all parts of them about the means of the piece: so they can be moved to those of all pieces, which are known
+    /// at the end, as are the standard deviations that signals are divided by. A product of a row is rounded as it is in a fit to the whole:
+    /// parameters are exact to eps kappa. O(N M^2) time for M products and parts, 1000 at most.
+    ///
+    /// # Errors
+    /// As for [`new`](Self::new); [`Error::Argument`] for functions whose centres, knots or weights are found from the samples, for products
+    /// that are chosen, and for several outputs.
+    ///
+    /// ```
+    /// use thetahat::data::{Channel, Log, Rows};
+    /// use thetahat::report::{MapPlan, NonlinearArxPlan, NormalEquations};
+    ///
+    /// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
+    /// let u: Vec<f64> = (0..200_u32).map(|t| f64::from(t * t % 11) - 4.0).collect();
+    /// let mut y = vec![0.0];
+    /// for t in 1..u.len() {
+    ///     y.push(0.5 * y[t - 1] + u[t - 1] * u[t - 1]);
+    /// }
+    /// let channel = |name: &str, values| Channel { name: name.into(), values };
+    /// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+    /// let terms = ["1", "y(k-1)", "u(k-1)", "u(k-1)^2"].map(str::to_owned).to_vec();
+    /// let map = MapPlan::Products { terms };
+    /// let plan = NonlinearArxPlan { map, raw_terms: true, ..NonlinearArxPlan::new(&["u"], &["y"]) };
+    /// let first = log.part(&["u", "y"], Rows::new(1, 100)?)?;
+    /// let second = log.part(&["u", "y"], Rows::new(101 - plan.lags(), 200)?)?;
+    /// let mut sums = NormalEquations::of_nonlinear_arx(&first, &[], &plan, 0)?;
+    /// sums.merge(&NormalEquations::of_nonlinear_arx(&second, &[], &plan, plan.lags())?)?;
+    /// let report = sums.solve()?;
+    /// let [_, past, _, square] = report.model.parameters() else { panic!("four terms") };
+    /// assert!((past.value - 0.5).abs() < 1e-12 && (square.value - 1.0).abs() < 1e-12);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn of_nonlinear_arx(
+        log: &Log,
+        sources: &[Source],
+        plan: &NonlinearArxPlan,
+        past: usize,
+    ) -> Result<Self, Error> {
+        let settings = Settings::of_nonlinear_arx(plan)?;
+        let products = Products::of(&settings)?;
+        let piece = Piece::new(log, sources, past, settings.lags())?;
+        let Summed { products, centred, totals, segments } = summed(&settings, &piece, &products)?;
+        Self::made(settings, &piece, (products, Some(centred)), totals, &segments)
+    }
+
+    /// Of each channel, where the samples of these segments count for the offsets of inputs, and of outputs.
+    fn totals(
+        settings: &Settings,
+        piece: &Piece<'_>,
+        (of_inputs, of_outputs): (&[Range<usize>], &[Range<usize>]),
+    ) -> Result<Vec<Totals>, Error> {
+        let totals = settings.names().into_iter().enumerate().map(|(channel, name)| {
+            let segments = if channel < settings.inputs.len() { of_inputs } else { of_outputs };
+            Ok(Totals::of(&piece.log.channel(name)?.values, piece.past, segments))
+        });
+        totals.collect()
+    }
+
+    /// Of a piece with these segments.
     fn made(
         settings: Settings,
         piece: &Piece<'_>,
-        products: ExtendedGram,
-        (of_inputs, of_outputs): (&[Range<usize>], &[Range<usize>]),
+        (products, centred): (ExtendedGram, Option<Centred>),
+        channels: Vec<Totals>,
+        segments: &[Range<usize>],
     ) -> Result<Self, Error> {
         let Piece { log, sources, past, ref own } = *piece;
         let names = settings.names();
-        let totals = names.iter().enumerate().map(|(channel, name)| {
-            let segments = if channel < settings.inputs.len() { of_inputs } else { of_outputs };
-            Ok(Totals::of(&log.channel(name)?.values, past, segments))
-        });
         Ok(Self {
             schema: Self::SCHEMA.to_owned(),
             sample_time: log.sample_time(),
             products,
-            channels: totals.collect::<Result<_, Error>>()?,
+            centred,
+            channels,
             rows: log.rows(),
-            segments: of_inputs.iter().map(Rows::from_positions).collect(),
+            segments: segments.iter().map(Rows::from_positions).collect(),
             time_gaps: log
                 .segment_starts()
                 .iter()
@@ -273,8 +369,18 @@ impl NormalEquations {
             Ok(Source { rows, ..log.clone() })
         });
         let logs = logs.collect::<Result<Vec<_>, Error>>()?;
+        let about = match (&self.centred, &other.centred) {
+            (Some(own), Some(others)) => {
+                let sums = (&self.products, &other.products);
+                Some(own.joined(others, &Products::of(&self.settings)?, sums))
+            }
+            _ => None,
+        };
         // From here on nothing fails.
-        self.products.merge(&other.products);
+        match about {
+            Some((centred, products)) => (self.centred, self.products) = (Some(centred), products),
+            None => self.products.merge(&other.products),
+        }
         self.channels.iter_mut().zip(&other.channels).for_each(|(own, more)| own.add(more));
         self.rows = rows;
         self.estimation.extend(estimation);
@@ -295,6 +401,10 @@ impl NormalEquations {
         match &self.settings.kind {
             Kind::Linear { orders, kernel, .. } => linear::solve(self, orders, *kernel),
             Kind::VectorArx { delays, arx, .. } => vector_arx::solve(self, delays, arx),
+            Kind::NonlinearArx { .. } => {
+                let centred = self.centred.as_ref().ok_or_else(Self::damaged)?;
+                nonlinear_arx::solve(self, centred)
+            }
         }
     }
 
@@ -340,6 +450,10 @@ impl NormalEquations {
         self.channels[channel].range.ok_or_else(|| {
             Error::data("no row of the pieces has a value in every channel; give other pieces or channels")
         })
+    }
+
+    fn damaged() -> Error {
+        Error::report("the parts of these normal equations do not fit together; make them again")
     }
 
     /// What is taken from a channel.
@@ -389,18 +503,23 @@ impl Document for NormalEquations {
 
     fn check(&self) -> Result<(), Error> {
         let channels = self.settings.names().len();
+        let centred = match (&self.settings.kind, &self.centred) {
+            (Kind::NonlinearArx { .. }, Some(centred)) => {
+                let of = |products: Products| centred.fits(self.channels.len(), &products);
+                Products::of(&self.settings).is_ok_and(of)
+            }
+            (Kind::NonlinearArx { .. }, None) => false,
+            (Kind::Linear { .. } | Kind::VectorArx { .. }, centred) => centred.is_none(),
+        };
         let fits = self.settings.fits(self.products.size())
-            && self.channels.len() == channels
+            && centred
+            && self.channels.len() == self.settings.all_names().len()
             && self.channels.iter().all(Totals::is_finite)
             && self.sample_time.is_finite()
             && self.sample_time > 0.0
             && !self.estimation.is_empty()
             && self.estimation.iter().chain(&self.segments).all(|rows| rows.last() <= self.rows)
             && self.border.fits(channels);
-        if fits {
-            Ok(())
-        } else {
-            Err(Error::report("the parts of these normal equations do not fit together; make them again"))
-        }
+        if fits { Ok(()) } else { Err(Self::damaged()) }
     }
 }

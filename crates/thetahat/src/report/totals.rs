@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::identify::{ROUNDING, constant};
 use crate::Error;
 use crate::model::Orders;
-use crate::regression::extended_sum;
+use crate::regression::{extended_product, extended_sum};
 
 /// What the pieces together say of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -18,6 +18,9 @@ pub(super) struct Totals {
     rows: usize,
     /// Their sum, and what that number lacks.
     sum: [f64; 2],
+    /// That of their squares, where the model asks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    squares: Option<[f64; 2]>,
     /// The least and the largest of them; none where there is none.
     pub(super) range: Option<[f64; 2]>,
     pub(super) missing: usize,
@@ -26,20 +29,26 @@ pub(super) struct Totals {
 impl Totals {
     /// Those of a channel of a piece, its past being left out; the samples in `segments` count.
     pub(super) fn of(values: &[f64], past: usize, segments: &[Range<usize>]) -> Self {
-        let sums = segments.iter().map(|rows| extended_sum(&values[rows.clone()]));
-        let sum = sums.fold(fx128::ZERO, fx128::add_accurate);
+        let sum = added(segments.iter().map(|rows| extended_sum(&values[rows.clone()])));
         let each = || segments.iter().flat_map(|rows| &values[rows.clone()]).copied();
         let range = each().fold(None, |range: Option<[f64; 2]>, value| {
             let [least, largest] = range.unwrap_or([value; 2]);
             Some([least.min(value), largest.max(value)])
         });
         let missing = values[past..].iter().filter(|value| value.is_nan()).count();
-        Self { rows: segments.iter().map(Range::len).sum(), sum: [sum.0, sum.1], range, missing }
+        Self { rows: segments.iter().map(Range::len).sum(), sum, squares: None, range, missing }
+    }
+
+    /// The same with the sum of squares.
+    pub(super) fn with_squares(self, values: &[f64], segments: &[Range<usize>]) -> Self {
+        let squares = segments.iter().map(|rows| &values[rows.clone()]).map(|own| extended_product(own, own));
+        Self { squares: Some(added(squares)), ..self }
     }
 
     pub(super) fn add(&mut self, other: &Self) {
-        let sum = self.sum().add_accurate(other.sum());
-        self.sum = [sum.0, sum.1];
+        let both = |one: [f64; 2], other: [f64; 2]| added([whole(one), whole(other)].into_iter());
+        self.sum = both(self.sum, other.sum);
+        self.squares = self.squares.zip(other.squares).map(|(own, more)| both(own, more));
         self.rows += other.rows;
         self.missing += other.missing;
         self.range = match (self.range, other.range) {
@@ -48,13 +57,16 @@ impl Totals {
         };
     }
 
-    fn sum(&self) -> fx128 {
-        let [sum, rest] = self.sum;
-        fx128::from_f64(sum).add_accurate(fx128::from_f64(rest))
+    /// Zero where there is no sample.
+    pub(super) fn mean(&self) -> f64 {
+        if self.rows == 0 { 0.0 } else { (whole(self.sum) / fx128::from_f64(self.rows as f64)).0 }
     }
 
-    pub(super) fn mean(&self) -> f64 {
-        (self.sum() / fx128::from_f64(self.rows as f64)).0
+    /// The standard deviation, where squares were summed.
+    pub(super) fn deviation(&self) -> Option<f64> {
+        let (sum, rows) = (whole(self.sum), fx128::from_f64(self.rows as f64));
+        let about = whole(self.squares?).sub_accurate(sum * sum / rows) / rows;
+        Some(about.0.max(0.0).sqrt())
     }
 
     /// What is told to be taken from the channel, or its mean. None without a sample that counts.
@@ -77,6 +89,16 @@ impl Totals {
     }
 
     pub(super) fn is_finite(&self) -> bool {
-        self.sum.iter().all(|value| value.is_finite())
+        self.sum.iter().chain(self.squares.iter().flatten()).all(|value| value.is_finite())
     }
+}
+
+/// A sum, and what that number lacks.
+fn added(numbers: impl Iterator<Item = fx128>) -> [f64; 2] {
+    let sum = numbers.fold(fx128::ZERO, fx128::add_accurate);
+    [sum.0, sum.1]
+}
+
+fn whole([sum, rest]: [f64; 2]) -> fx128 {
+    fx128::from_f64(sum).add_accurate(fx128::from_f64(rest))
 }

@@ -3,10 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::candidates::Candidates;
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::NonlinearArxModel;
 use crate::optimize::{Algorithm, Stopped};
+use crate::regression::ChosenTerm;
 use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 
@@ -109,6 +111,28 @@ pub struct RunFigures {
     pub percent: Option<f64>,
     /// Whether the run stays within 1.1 times the range of the output in the estimation rows and in those of the run, about its middle.
     pub in_range: bool,
+}
+
+impl TermStep {
+    /// The step to so many parameters that chooses a candidate, with the mean square of what it leaves.
+    pub(super) fn of(
+        candidates: &Candidates,
+        regressors: &[String],
+        chosen: &ChosenTerm,
+        parameters: usize,
+        mean_square: f64,
+    ) -> Self {
+        let name = |place: &usize| candidates.name(*place, regressors);
+        Self {
+            term: name(&chosen.place),
+            parameters,
+            error_reduction: chosen.reduction,
+            aliases: chosen.aliases.iter().map(name).collect(),
+            rmse: mean_square.max(0.0).sqrt(),
+            free_run: None,
+            held_out: None,
+        }
+    }
 }
 
 impl RunFigures {

@@ -2,7 +2,7 @@
 
 use thetahat_core::nalgebra::DVector;
 
-use super::super::{ExtendedGram, Lagged, Regression, Unsolved};
+use super::super::{DividedMonomials, ExtendedGram, Lagged, Regression, Unsolved};
 use super::{Case, Noise, Presample, Reference, hard_cases, output, taps, whole};
 
 fn solved(gram: &ExtendedGram, case: &Case) -> Regression {
@@ -154,4 +154,24 @@ fn what_the_rows_do_not_tell_is_named() {
     let found = solved(&ExtendedGram::of(&case.lagged()), &case);
     let expected = DVector::from_column_slice(&[-0.5, 1.0, 0.5]);
     assert!((found.parameters - expected).norm() < 1e-14 && found.residual_norm < 1e-13);
+}
+
+#[test]
+fn sums_move_to_other_centres() {
+    let rows = 3000;
+    let value = |index: usize, row: usize| ((row * row + 7 * row * (index + 1)) % (11 + index)) as f64 - 4.0;
+    // x_0^2 x_1, and x_1 x_2: whole numbers, so that all sums are exact.
+    let set = DividedMonomials::new(&[vec![0, 1, 0], vec![2, 1]], 3).unwrap();
+    assert_eq!((set.size(), set.place(&[]), set.place(&[1, 0]).is_some()), (9, Some(0), true));
+    assert_eq!(set.place(&[2, 2]), None);
+    let about = |centre: [f64; 4]| {
+        let fill = |index: usize, first: usize, into: &mut [f64]| {
+            into.iter_mut().zip(first..).for_each(|(into, row)| *into = value(index, row) - centre[index]);
+        };
+        set.sums(rows, fill)
+    };
+    let (here, there) = ([0.0; 4], [3.0, -2.0, 0.0, 1e3]);
+    assert_eq!(set.moved(&about(here), &here, &there), about(there));
+    assert_eq!(set.moved(&about(there), &there, &here), about(here));
+    assert!(DividedMonomials::new(&[(0..12).collect()], 12).is_none());
 }

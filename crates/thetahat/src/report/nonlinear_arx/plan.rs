@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
 use crate::estimate::nonlinear_arx::Units;
@@ -25,7 +28,7 @@ const MOST_UNITS: usize = 2000;
 const SPLIT: [f64; 3] = [70.0, 30.0, 0.0];
 
 /// Which lags of an input a nonlinear ARX model reads: `lags` of them from `delay` on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct InputLags {
     /// How many.
     pub lags: usize,
@@ -210,13 +213,20 @@ impl NonlinearArxPlan {
         }
     }
 
+    /// How many rows before a row the model reads at most.
+    pub fn lags(&self) -> usize {
+        let of_inputs = self.input_lags.iter().filter(|input| input.lags > 0);
+        let longest = of_inputs.map(|input| input.delay.saturating_add(input.lags - 1));
+        longest.chain(self.output_lags.iter().copied()).max().unwrap_or(0)
+    }
+
     /// Outputs, then inputs.
-    pub(super) fn channels(&self) -> impl Iterator<Item = &str> {
+    pub(in crate::report) fn channels(&self) -> impl Iterator<Item = &str> {
         self.outputs.iter().chain(&self.inputs).map(String::as_str)
     }
 
     /// The expressions, of the channels in their order.
-    pub(super) fn read_expressions(&self) -> Result<Vec<ChannelExpression>, Error> {
+    pub(in crate::report) fn read_expressions(&self) -> Result<Vec<ChannelExpression>, Error> {
         let names: Vec<&str> = self.channels().collect();
         let wrong = |what: String| Error::argument("regressor", what);
         if let (Detrend::Linear, Some(text)) = (self.detrend, self.expressions.first()) {

@@ -5,12 +5,15 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::super::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan};
 use super::super::state_space::StateSpacePlan;
 use super::Plan;
+use super::nonlinear_arx::Products;
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
 use crate::estimate::{Constant, Initial, Kernel, Method, VectorArxInputs, VectorArxOptions};
 use crate::model::Orders;
+use crate::respond::Horizon;
 use crate::select::Choice;
 
 /// More rows than any model reaches back to.
@@ -42,6 +45,15 @@ pub(super) enum Kind {
     },
     /// Of polynomials with matrices for coefficients.
     VectorArx { outputs: Vec<String>, delays: Vec<usize>, arx: VectorArxOptions },
+    /// Of products of regressors.
+    NonlinearArx {
+        outputs: Vec<String>,
+        output_lags: Vec<usize>,
+        input_lags: Vec<InputLags>,
+        expressions: Vec<String>,
+        terms: Vec<String>,
+        raw_terms: bool,
+    },
 }
 
 impl Settings {
@@ -68,7 +80,7 @@ impl Settings {
         };
         check_rows(&plan.estimate, &plan.validate, plan.split)?;
         check_detrend(plan.detrend)?;
-        let refused = [
+        refuse([
             (
                 plan.prefilter.is_some(),
                 "prefilter",
@@ -84,10 +96,7 @@ impl Settings {
                 "initial",
                 "rows without a full regressor are left out; give drop, or leave it out",
             ),
-        ];
-        if let Some((_, argument, message)) = refused.into_iter().find(|(refused, _, _)| *refused) {
-            return Err(Error::argument(argument, message));
-        }
+        ])?;
         Ok(Self {
             inputs: plan.inputs.clone(),
             kind: Kind::Linear { output: plan.output.clone(), orders: orders.clone(), kernel },
@@ -132,6 +141,81 @@ impl Settings {
         Ok(settings)
     }
 
+    /// Of a nonlinear ARX model of products that are known.
+    pub(super) fn of_nonlinear_arx(plan: &NonlinearArxPlan) -> Result<Self, Error> {
+        plan.check()?;
+        let terms = match &plan.map {
+            MapPlan::Products { terms } => terms.clone(),
+            MapPlan::Polynomial { .. } => {
+                return Err(Error::argument(
+                    "term",
+                    "free runs say which products are chosen, and the log is not read again; name the products",
+                ));
+            }
+            _ => {
+                return Err(Error::argument(
+                    "narx",
+                    "centres, knots, boxes and weights are found from the samples, which are not read again; from pieces come models of \
+                     products that are named",
+                ));
+            }
+        };
+        check_rows(&plan.estimate, &plan.validate, plan.split)?;
+        check_detrend(plan.detrend)?;
+        refuse([
+            (
+                plan.outputs.len() > 1,
+                "output",
+                "pieces make nonlinear models of one output; make one after the other, to which the other outputs are inputs",
+            ),
+            (
+                plan.ridge.is_some_and(|ridge| ridge > 0.0),
+                "ridge",
+                "normal equations give least squares; leave it out",
+            ),
+            (
+                plan.focus.is_some_and(|focus| focus != Horizon::ONE_STEP),
+                "focus",
+                "longer runs read the log again and again; leave it out, or take prediction",
+            ),
+        ])?;
+        Ok(Self {
+            inputs: plan.inputs.clone(),
+            kind: Kind::NonlinearArx {
+                outputs: plan.outputs.clone(),
+                output_lags: plan.output_lags.clone(),
+                input_lags: plan.input_lags.clone(),
+                expressions: plan.expressions.clone(),
+                terms,
+                raw_terms: plan.raw_terms,
+            },
+            detrend: plan.detrend.to_string(),
+            offsets: plan.offsets.clone(),
+            constant: Constant::No,
+        })
+    }
+
+    /// The plan that a nonlinear ARX model was made with.
+    pub(super) fn nonlinear_plan(&self) -> Result<NonlinearArxPlan, Error> {
+        let Kind::NonlinearArx { outputs, output_lags, input_lags, expressions, terms, raw_terms } =
+            &self.kind
+        else {
+            return Err(Error::argument("map", "the model is not one of products"));
+        };
+        Ok(NonlinearArxPlan {
+            inputs: self.inputs.clone(),
+            outputs: outputs.clone(),
+            expressions: expressions.clone(),
+            detrend: self.detrend.parse()?,
+            offsets: self.offsets.clone(),
+            output_lags: output_lags.clone(),
+            input_lags: input_lags.clone(),
+            map: MapPlan::Products { terms: terms.clone() },
+            raw_terms: *raw_terms,
+            ..NonlinearArxPlan::new(&[], &[])
+        })
+    }
+
     /// How many rows the model reaches back to.
     pub(super) fn lags(&self) -> usize {
         match &self.kind {
@@ -140,19 +224,29 @@ impl Settings {
                 let late = delays.iter().copied().max().unwrap_or(0);
                 late.saturating_add(arx.longest(self.inputs.len()))
             }
+            Kind::NonlinearArx { .. } => self.nonlinear_plan().map_or(0, |plan| plan.lags()),
         }
     }
 
     pub(super) fn outputs(&self) -> &[String] {
         match &self.kind {
             Kind::Linear { output, .. } => std::slice::from_ref(output),
-            Kind::VectorArx { outputs, .. } => outputs,
+            Kind::VectorArx { outputs, .. } | Kind::NonlinearArx { outputs, .. } => outputs,
         }
     }
 
     /// The channels, the inputs first.
     pub(super) fn names(&self) -> Vec<&str> {
         self.inputs.iter().chain(self.outputs()).map(String::as_str).collect()
+    }
+
+    /// The channels, and the expressions of them that are read.
+    pub(super) fn all_names(&self) -> Vec<&str> {
+        let expressions = match &self.kind {
+            Kind::NonlinearArx { expressions, .. } => expressions.as_slice(),
+            Kind::Linear { .. } | Kind::VectorArx { .. } => &[],
+        };
+        self.names().into_iter().chain(expressions.iter().map(String::as_str)).collect()
     }
 
     /// What is set by hand of a channel, or nothing at all; none: its mean.
@@ -178,7 +272,7 @@ impl Settings {
         }
         if self != other {
             return differ(
-                "they were made with other offsets, another constant, or another kernel; make all with the same settings".to_owned(),
+                "they were made with other offsets, another constant, another kernel or other products; make all with the same settings".to_owned(),
             );
         }
         Ok(())
@@ -204,6 +298,9 @@ impl Settings {
                     && !matches!(&arx.nb, VectorArxInputs::Each(each) if each.len() != inputs)
                     && self.lags() <= MOST_LAGS
                     && columns == size as u128
+            }
+            Kind::NonlinearArx { outputs, .. } => {
+                outputs.len() == 1 && Products::of(self).is_ok_and(|products| products.columns() == size)
             }
         };
         of_kind
@@ -234,8 +331,15 @@ impl fmt::Display for Kind {
                 let inputs = if delays.is_empty() { String::new() } else { format!(", {nb}, {nk}") };
                 write!(formatter, "ARX({}{inputs}) with {} outputs", range(&arx.na), outputs.len())
             }
+            Self::NonlinearArx { terms, .. } => write!(formatter, "NARX polynomial, {} terms", terms.len()),
         }
     }
+}
+
+/// What is asked for and cannot be: whether it is, its argument, and why not.
+fn refuse<const COUNT: usize>(refused: [(bool, &str, &str); COUNT]) -> Result<(), Error> {
+    let first = refused.into_iter().find(|(asked, _, _)| *asked);
+    first.map_or(Ok(()), |(_, argument, message)| Err(Error::argument(argument, message)))
 }
 
 fn check_rows(estimate: &[Rows], validate: &[Rows], split: Option<Split>) -> Result<(), Error> {

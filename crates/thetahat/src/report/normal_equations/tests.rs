@@ -1,5 +1,6 @@
 //! One model from pieces is that of the whole log.
 
+mod nonlinear_arx;
 mod vector_arx;
 
 use super::*;
@@ -300,4 +301,12 @@ fn documents_that_do_not_fit_together_are_refused() {
         assert!(text.contains(from), "{from}");
         assert!(NormalEquations::from_json(&text.replace(from, to)).is_err(), "{to}");
     }
+    // Models of polynomials have the fields that they had before there were other kinds.
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let keys = |of: &serde_json::Value| of.as_object().unwrap().keys().cloned().collect::<Vec<_>>().join(" ");
+    let settings = ["constant", "detrend", "inputs", "kernel", "offsets", "orders", "output"];
+    let mut found: Vec<String> = keys(&value["settings"]).split(' ').map(str::to_owned).collect();
+    found.sort_unstable();
+    assert_eq!(found, settings);
+    assert!(value.get("centred").is_none() && value["channels"][0].get("squares").is_none());
 }

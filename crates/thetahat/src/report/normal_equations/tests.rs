@@ -8,6 +8,7 @@ use crate::data::{Channel, Detrend};
 use crate::estimate::{Constant, Initial, Kernel, Method};
 use crate::model::{OffsetCovariance, Orders};
 use crate::report::identify;
+use crate::respond::Horizon;
 use crate::select::Choice;
 
 /// Numbers in -1 … 1.

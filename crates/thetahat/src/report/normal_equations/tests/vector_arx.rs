@@ -3,7 +3,6 @@
 use super::*;
 use crate::estimate::{Coupling, VectorArxInputs, VectorArxOptions};
 use crate::report::fit_state_space;
-use crate::respond::Horizon;
 
 /// Two inputs, and two outputs that follow one another.
 fn log(rows: usize, level: f64) -> Log {

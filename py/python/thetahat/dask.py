@@ -151,7 +151,7 @@ def normal_equations(
 ) -> Delayed:
     """The normal equations of one model, of which the workers of Dask have pieces: `thetahat.NormalEquations`, merged as a tree.
 
-    A worker has one piece of a file or two in memory for each of its threads, and hands on some kilobytes. The result is solved where it is wanted:
+    A worker has one piece in memory for each of its threads, reads it once, and hands on some kilobytes. The result is solved where it is wanted:
     ``normal_equations(…).compute().solve()`` is the model that a fit to all rows in one pass gives.
 
     Parameters
@@ -447,7 +447,9 @@ def _part(work: _many.Work, run: Sequence[tuple[str, Any]], front: int, lags: in
                     own = taken if own is None else _joined_columns(own, taken)
                 if rows < len(log):
                     before = rows + (0 if past is None else len(next(iter(past.values()))))
-                    piece = _NormalEquations(log if past is None else _after(past, _columns(log), log, name), past=before, **orders)
+                    # What has dates gets the one origin that all pieces share.
+                    whole = log if past is None and not _has_dates(log) else _after(past, _columns(log), log, name)
+                    piece = _NormalEquations(whole, past=before, **orders)
                     sums = piece if sums is None else sums.merge(piece)
             if lags:
                 past = _past(past, _columns(log, slice(-lags, None)), lags)
@@ -476,9 +478,14 @@ def _joined_columns(one: dict[str | None, Any], other: dict[str | None, Any]) ->
     return {name: numpy.concatenate([values, other[name]]) for name, values in one.items()}
 
 
-def _after(past: dict[str | None, Any], rows: dict[str | None, Any], like: Log, name: str) -> Log:
+def _has_dates(log: Log) -> bool:
+    _, start = log._log.clock
+    return start is not None
+
+
+def _after(past: dict[str | None, Any] | None, rows: dict[str | None, Any], like: Log, name: str) -> Log:
     """Rows with those before them in front, as a log with the channels of another."""
-    columns = _joined_columns(past, rows)
+    columns = rows if past is None else _joined_columns(past, rows)
     clock = {"time": columns[None]} if None in columns else {"sample_time": like.sample_time}
     outputs, inputs = ({name: columns[name] for name in names} for names in (like.outputs, like.inputs))
     return _called(Log(outputs, inputs or None, **clock), name)

@@ -17,21 +17,10 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> C
     let row_of = |position: usize| rows.as_ref().map_or(position, |rows| rows[position]);
     let count = rows.as_ref().map_or(all.len(), Vec::len);
     let mut quality = ChannelQuality {
-        name: channel.name.clone(),
-        role: role.map(str::to_owned),
         missing: all.len() - count,
-        minimum: None,
-        maximum: None,
-        mean: None,
-        standard_deviation: None,
-        trend: None,
-        trend_share: None,
         repeated: all.windows(2).filter(|pair| pair[0] == pair[1]).count(),
         longest_hold: saturation::runs(all).map(|run| run.rows).max().unwrap_or(0),
-        quantization: None,
-        saturation: None,
-        outliers: Vec::new(),
-        outlier_count: 0,
+        ..ChannelQuality::without_values(&channel.name, role)
     };
     let mut sorted: Vec<f64> = all.iter().copied().filter(|value| !value.is_nan()).collect();
     sorted.sort_unstable_by(f64::total_cmp);

@@ -222,6 +222,27 @@ fn only<T: Clone>(all: &[T], wanted: impl Fn(&T) -> bool) -> Vec<T> {
 }
 
 impl ChannelQuality {
+    /// That of a channel without any value.
+    pub(super) fn without_values(name: &str, role: Option<&str>) -> Self {
+        Self {
+            name: name.to_owned(),
+            role: role.map(str::to_owned),
+            missing: 0,
+            minimum: None,
+            maximum: None,
+            mean: None,
+            standard_deviation: None,
+            trend: None,
+            trend_share: None,
+            repeated: 0,
+            longest_hold: 0,
+            quantization: None,
+            saturation: None,
+            outliers: Vec::new(),
+            outlier_count: 0,
+        }
+    }
+
     /// How many things may be wrong with it.
     fn faults(&self) -> usize {
         let constant = self.minimum == self.maximum;
@@ -231,6 +252,18 @@ impl ChannelQuality {
 }
 
 impl Inspection {
+    /// Gives inputs that are the same as another one its delay.
+    pub(super) fn share_delays(&mut self) {
+        for of in &self.excitation {
+            let Some(first) = &of.same_as else { continue };
+            let of_first = self.delays.iter().find(|delay| delay.input == *first).cloned();
+            let own = self.delays.iter_mut().find(|delay| delay.input == of.input);
+            if let (Some(first), Some(own)) = (of_first, own) {
+                (own.nk, own.confidence) = (first.nk, first.confidence);
+            }
+        }
+    }
+
     /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before the inputs,
     /// these before the others, and among them those first with the most to say of. Warnings are cut to as many. A log of
     /// up to twice as many channels, or warnings, keeps all of them. O(M log M) for M channels.

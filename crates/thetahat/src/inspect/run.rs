@@ -259,13 +259,6 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
             )
         }));
     }
-    for of in inspection.excitation.iter() {
-        let Some(first) = &of.same_as else { continue };
-        let of_first = inspection.delays.iter().find(|delay| delay.input == *first).cloned();
-        let own = inspection.delays.iter_mut().find(|delay| delay.input == of.input);
-        if let (Some(first), Some(own)) = (of_first, own) {
-            (own.nk, own.confidence) = (first.nk, first.confidence);
-        }
-    }
+    inspection.share_delays();
     Ok(())
 }

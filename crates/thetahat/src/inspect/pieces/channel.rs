@@ -203,21 +203,10 @@ impl ChannelTotals {
         }
         let mut words = Vec::new();
         let mut quality = ChannelQuality {
-            name: name.to_owned(),
-            role: role.map(str::to_owned),
             missing: self.missing,
-            minimum: None,
-            maximum: None,
-            mean: None,
-            standard_deviation: None,
-            trend: None,
-            trend_share: None,
             repeated: self.repeated,
             longest_hold: self.longest_hold,
-            quantization: None,
-            saturation: None,
-            outliers: Vec::new(),
-            outlier_count: 0,
+            ..ChannelQuality::without_values(name, role)
         };
         let Some([minimum, maximum]) = self.range() else { return (quality, words) };
         (quality.minimum, quality.maximum) = (Some(minimum), Some(maximum));

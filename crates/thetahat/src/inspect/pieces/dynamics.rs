@@ -238,14 +238,7 @@ impl Dynamics {
         for (input, delay) in inspection.delays.iter_mut().enumerate() {
             delay.scale(of_output.zip(unit(input)).map_or(f64::NAN, |(output, input)| output / input));
         }
-        for of in &inspection.excitation {
-            let Some(first) = &of.same_as else { continue };
-            let of_first = inspection.delays.iter().find(|delay| delay.input == *first).cloned();
-            let own = inspection.delays.iter_mut().find(|delay| delay.input == of.input);
-            if let (Some(first), Some(own)) = (of_first, own) {
-                (own.nk, own.confidence) = (first.nk, first.confidence);
-            }
-        }
+        inspection.share_delays();
         Ok(())
     }
 }

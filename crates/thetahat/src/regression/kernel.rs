@@ -191,10 +191,15 @@ pub(crate) fn add_filtered(target: &mut [f64], weights: &[f64], x: &[f64]) {
 }
 
 /// The sum of `values`, in eight lanes.
-pub(crate) fn sum(values: impl Iterator<Item = f64>) -> f64 {
+pub(crate) fn sum(mut values: impl Iterator<Item = f64>) -> f64 {
     let mut lanes = [0.0; LANES];
-    for (position, value) in values.enumerate() {
-        lanes[position % LANES] += value;
+    // A round of all lanes at a time, so that they stay in registers.
+    loop {
+        for lane in &mut lanes {
+            match values.next() {
+                Some(value) => *lane += value,
+                None => return fold(lanes),
+            }
+        }
     }
-    fold(lanes)
 }

@@ -62,39 +62,57 @@ impl Fit {
         part: Option<Part>,
         (horizon, initial): (Horizon, InitialCondition),
     ) -> Self {
-        let counted = || response.counted.iter().cloned().flatten();
-        let samples = response.counted.iter().map(|rows| rows.len()).sum::<usize>();
-        let pairs = || counted().map(|t| (measured[t], response.values[t]));
-        let (percent, rmse) = closeness(pairs());
-        let errors = || pairs().map(|(measured, said)| (measured - said).abs());
-        let known = |figure: f64| Some(figure).filter(|figure| samples > 0 && figure.is_finite());
+        let figures = match response.counted.as_slice() {
+            // Side by side: no row need be looked up by itself.
+            [counted] => {
+                let measured = measured[counted.clone()].iter().copied();
+                figures(measured.zip(response.values[counted.clone()].iter().copied()))
+            }
+            all => {
+                let counted = all.iter().cloned().flatten();
+                figures(counted.map(|t| (measured[t], response.values[t])))
+            }
+        };
         Self {
             output: output.to_owned(),
             rows: rows.to_vec(),
             part,
             horizon,
             initial,
-            samples,
-            percent,
-            rmse,
-            mean_absolute_error: known(sum(errors()) / samples as f64),
-            // One that is not a number stays one.
-            largest_error: known(
-                errors().fold(0.0_f64, |largest, e| if e > largest || e.is_nan() { e } else { largest }),
-            ),
+            samples: response.counted.iter().map(|rows| rows.len()).sum::<usize>(),
+            percent: figures.percent,
+            rmse: figures.rmse,
+            mean_absolute_error: figures.mean_absolute_error,
+            largest_error: figures.largest_error,
             outside: None,
         }
     }
 }
 
-/// percent and rmse, as [`Fit`] defines them, of pairs of a measured value and what a model says.
-fn closeness(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (Option<f64>, Option<f64>) {
+/// The figures of a [`Fit`]; none where they are no finite numbers.
+struct Figures {
+    percent: Option<f64>,
+    rmse: Option<f64>,
+    mean_absolute_error: Option<f64>,
+    largest_error: Option<f64>,
+}
+
+/// Those of pairs of a measured value and what a model says.
+fn figures(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Figures {
     let n = pairs.clone().count() as f64;
     let mean = sum(pairs.clone().map(|(measured, _)| measured)) / n;
     let error = sum(pairs.clone().map(|(measured, said)| (measured - said).powi(2))).sqrt();
-    let spread = sum(pairs.map(|(measured, _)| (measured - mean).powi(2))).sqrt();
+    let spread = sum(pairs.clone().map(|(measured, _)| (measured - mean).powi(2))).sqrt();
+    let errors = || pairs.clone().map(|(measured, said)| (measured - said).abs());
+    // One that is not a number stays one.
+    let largest = errors().fold(0.0_f64, |largest, e| if e > largest || e.is_nan() { e } else { largest });
     let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
-    (finite(100.0 * (1.0 - error / spread)), finite(error / n.sqrt()))
+    Figures {
+        percent: finite(100.0 * (1.0 - error / spread)),
+        rmse: finite(error / n.sqrt()),
+        mean_absolute_error: finite(sum(errors()) / n),
+        largest_error: finite(largest).filter(|_| n > 0.0),
+    }
 }
 
 #[cfg(test)]

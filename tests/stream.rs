@@ -141,6 +141,7 @@ fn what_one_pass_cannot_do_is_refused() {
         ("other.csv --input u2 --output u1,y --na 1 --nb 1 --nk 1..3", 2, "nk"),
         ("other.csv --input u2 --output u1,y", 2, "--stream is for ARX"),
         ("log.csv --narx poly", 2, "name the products"),
+        ("log.csv --narx poly --select cv", 2, "free runs say how many"),
         ("log.csv --narx rbf", 2, "found from the samples"),
         ("other.csv --input u2 --output u1,y --narx poly --term 1", 2, "one output"),
         ("log.csv --narx poly --term y(k-1) --html page.html", 2, "--html"),

@@ -83,7 +83,7 @@ pub(crate) struct FitArguments {
     pub(crate) format: FormatArgument,
     /// Read the logs once, part by part, in memory that does not grow with their rows, for an ARX or AR model of given orders or an
     /// impulse response: the same parameters. With several outputs the orders may be ranges. Of
-    /// nonlinear ARX models those of products that are named (--narx poly --term) The figures that need the log again, of free runs and of held-out rows, are left out
+    /// nonlinear ARX models those of products (--narx poly with --term, --terms or --select mdl) The figures that need the log again, of free runs and of held-out rows, are left out
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "grey", "from", "continuous", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]

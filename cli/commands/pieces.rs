@@ -37,7 +37,7 @@ impl PiecesJob {
                 Ok(Self::VectorArx(Box::new(job)))
             } else {
                 Err(Failure::usage(
-                    "--stream is for ARX and AR models, nonlinear ones of products that are named, and impulse responses: the states of a subspace method are evaluated on the log, \
+                    "--stream is for ARX and AR models, nonlinear ones of products, and impulse responses: the states of a subspace method are evaluated on the log, \
                      which is not read again; leave it out",
                 ))
             };

@@ -171,9 +171,21 @@ def test_products_of_a_nonlinear_model(log: th.Log, options: dict[str, Any]) -> 
     np.testing.assert_allclose(found.predict(log), whole.predict(log), rtol=1e-9, equal_nan=True)
 
 
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize("options", [{"terms": 5, "degree": 3}, {"select": "mdl", "most_terms": 15}])
+def test_products_that_are_chosen(log: th.Log, options: dict[str, Any]) -> None:
+    orders: dict[str, Any] = {"ny": 2, "nu": 2, "nk": [1, 2], **options}
+    sums = th.NormalEquations(log[:1700], **orders) | th.NormalEquations(log[1697:], past=3, **orders)
+    found, whole = sums.solve(), th.narx(log, **orders)
+    assert found.parameter_names == whole.parameter_names
+    np.testing.assert_allclose(found.parameters, whole.parameters, rtol=1e-12, atol=1e-12)
+
+
 def test_products_of_other_kinds_are_refused(log: th.Log, two: th.Log) -> None:
     with pytest.raises(TypeError, match="terms: expected a sequence of str"):
         th.NormalEquations(log, terms="y(k-1)")
+    with pytest.raises(ValueError, match="select: free runs say how many products"):
+        th.NormalEquations(log, select="cv")
     with pytest.raises(ValueError, match="output: pieces make nonlinear models of one output"):
         th.NormalEquations(two, terms=["y1(k-1)"])
     with pytest.raises(ValueError, match="other products"):

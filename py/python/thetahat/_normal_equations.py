@@ -43,9 +43,13 @@ class NormalEquations:
         In place of na and nb: how many values the impulse response of a finite one has.
     kernel : {"dc", "tc"} or None, default "dc"
         What is known of that response, see `fir`.
-    terms : sequence of str, optional
+    terms : sequence of str, or int, optional
         In place of na and nb: the products of a nonlinear ARX model with one output, as `thetahat.narx` writes them, such as
-        ``["1", "y(k-1)", "y(k-1)*u(k-1)^2"]``.
+        ``["1", "y(k-1)", "y(k-1)*u(k-1)^2"]``; or how many forward regression takes of those with at most ``degree`` factors.
+    select : str, optional
+        In place of terms: the information criterion that says how many, such as ``"mdl"``.
+    degree, most_terms : int, optional
+        Of products that are chosen: factors at most, 2 unless it is said, and how many products are looked at, 40.
     ny, nu : int, optional
         With terms: how many values of the output and of each input these read, 2 unless it is said.
     regressors : sequence of str, optional
@@ -103,7 +107,10 @@ class NormalEquations:
         past: int = 0,
         taps: int | Sequence[int] | None = None,
         kernel: str | None = "dc",
-        terms: Sequence[str] | None = None,
+        terms: int | Sequence[str] | None = None,
+        select: str | None = None,
+        degree: int | None = None,
+        most_terms: int | None = None,
         ny: Lags | None = None,
         nu: Lags | None = None,
         regressors: Sequence[str] | None = None,
@@ -114,19 +121,19 @@ class NormalEquations:
         constant: str | None = None,
     ) -> None:
         data = handle("log", log)
-        if terms is not None:
+        if terms is not None or select is not None:
             others: dict[str, Any] = {"na": na, "nb": nb, "taps": taps, "couple": couple, "constant": constant}
             for name, value in others.items():
                 if value is not None:
                     raise ValueError(f"{name}: it is not of nonlinear models, whose products are named; leave it or the terms out")
-            if isinstance(terms, str) or not isinstance(terms, Sequence):
-                raise TypeError(f"terms: expected a sequence of str, found {terms!r}")
+            if isinstance(terms, str):
+                raise TypeError(f"terms: expected a sequence of str, or an int, found {terms!r}")
             words = ["--narx=poly", *_options.order_words(ny=ny, nu=nu, nk=nk)]
-            own = {"terms": list(terms), "regressors": regressors, "raw_terms": raw_terms, "detrend": detrend, "offset": offset}
-            words += _options.words(NarxOptions, own)
+            words += _options.words(NarxOptions, locals())
             self._sums = _thetahat.NormalEquations(data, words, _past(past))
             return
-        products: dict[str, Any] = {"ny": ny, "nu": nu, "regressors": regressors, "raw_terms": raw_terms or None}
+        products: dict[str, Any] = {"ny": ny, "nu": nu, "degree": degree, "most_terms": most_terms, "regressors": regressors}
+        products["raw_terms"] = raw_terms or None
         for name, value in products.items():
             if value is not None:
                 raise ValueError(f"{name}: it is for products; give terms too, or leave it out")

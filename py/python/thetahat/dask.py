@@ -374,10 +374,18 @@ def _shared() -> Iterator[None]:
 
 
 def _lags(
-    na: Any = 0, nb: Any = 0, nk: Any = None, taps: Any = None, terms: Any = None, ny: Any = None, nu: Any = None, **_: Any
+    na: Any = 0,
+    nb: Any = 0,
+    nk: Any = None,
+    taps: Any = None,
+    terms: Any = None,
+    select: Any = None,
+    ny: Any = None,
+    nu: Any = None,
+    **_: Any,
 ) -> int:
     """How many rows the model reaches back to, at most. Orders are numbers, ranges, or one of these for each input."""
-    if terms is not None:
+    if terms is not None or select is not None:
         na, nb = 2 if ny is None else ny, 2 if nu is None else nu
     first = (0 if taps is not None else 1) if nk is None else _largest(nk)
     count = _largest(nb if taps is None else taps)

@@ -330,7 +330,18 @@ impl<'l> Samples<'l> {
         let products = merged(blocks.iter().map(|(_, products)| products))
             .unwrap_or_else(|| self.products(candidates, &self.rows));
         let path = self.path(candidates, &products, most);
-        self.check(candidates, &products, &path, count)?;
+        if !products.is_finite() {
+            return Err(Error::data(match candidates {
+                Candidates::Products(_) => {
+                    "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
+                     that signals are divided by their scale"
+                }
+                Candidates::Functions { .. } => {
+                    "sums of the functions leave the range of numbers; leave out `raw-terms`, so that signals are divided by their scale"
+                }
+            }));
+        }
+        check(candidates, &self.names(), self.rows.len(), &path, count)?;
         let lengths = path.chosen.len();
         let held_out = match count {
             Count::HeldOut(rows) => {
@@ -351,62 +362,6 @@ impl<'l> Samples<'l> {
     /// The names of the regressors.
     pub(crate) fn names(&self) -> Vec<String> {
         self.head.regressors.iter().map(|one| one.name()).collect()
-    }
-
-    /// Refuses a path that does not have what is asked for.
-    fn check(
-        &self,
-        candidates: &Candidates,
-        products: &Products,
-        path: &Path,
-        count: &Count,
-    ) -> Result<(), Error> {
-        let always = candidates.always();
-        let undetermined = |message: String| Err(Error::undetermined(Vec::new(), message));
-        if !products.is_finite() {
-            return Err(Error::data(match candidates {
-                Candidates::Products(_) => {
-                    "sums of products of the regressors leave the range of numbers; take a lower degree, or leave out `raw-terms`, so \
-                     that signals are divided by their scale"
-                }
-                Candidates::Functions { .. } => {
-                    "sums of the functions leave the range of numbers; leave out `raw-terms`, so that signals are divided by their scale"
-                }
-            }));
-        }
-        if path.chosen.is_empty() {
-            return undetermined(
-                "no function explains anything of the output on the estimation rows; name rows in which it changes, other lags, or a \
-                 smaller `ridge` where there is one"
-                    .to_owned(),
-            );
-        }
-        let taken = path.places(always);
-        if let Some(missing) = (0..always).find(|place| !taken.contains(place)) {
-            let name = candidates.name(missing, &self.names());
-            return Err(Error::undetermined(
-                vec![name.clone()],
-                format!(
-                    "{name} is a sum of the other functions on the estimation rows; take fewer lags or centres, or other rows"
-                ),
-            ));
-        }
-        let Count::Given(wanted) = *count else { return Ok(()) };
-        if wanted < always {
-            return Err(Error::argument(
-                "terms",
-                format!("{wanted} functions are asked for, and {always} are always there; ask for more"),
-            ));
-        }
-        if wanted > path.chosen.len() {
-            return undetermined(format!(
-                "{wanted} functions are asked for, and {} samples tell {} of {} apart; take fewer `terms`, or more rows",
-                self.rows.len(),
-                path.chosen.len(),
-                candidates.count(self.taps.len())
-            ));
-        }
-        Ok(())
     }
 
     /// The path as documents have it.
@@ -565,6 +520,50 @@ impl<'l> Samples<'l> {
             },
         })
     }
+}
+
+/// Refuses a path of a choice from so many samples that does not have what is asked for.
+fn check(
+    candidates: &Candidates,
+    regressors: &[String],
+    samples: usize,
+    path: &Path,
+    count: &Count,
+) -> Result<(), Error> {
+    let always = candidates.always();
+    let undetermined = |message: String| Err(Error::undetermined(Vec::new(), message));
+    if path.chosen.is_empty() {
+        return undetermined(
+            "no function explains anything of the output on the estimation rows; name rows in which it changes, other lags, or a \
+             smaller `ridge` where there is one"
+                .to_owned(),
+        );
+    }
+    let taken = path.places(always);
+    if let Some(missing) = (0..always).find(|place| !taken.contains(place)) {
+        let name = candidates.name(missing, regressors);
+        return Err(Error::undetermined(
+            vec![name.clone()],
+            format!(
+                "{name} is a sum of the other functions on the estimation rows; take fewer lags or centres, or other rows"
+            ),
+        ));
+    }
+    let Count::Given(wanted) = *count else { return Ok(()) };
+    if wanted < always {
+        return Err(Error::argument(
+            "terms",
+            format!("{wanted} functions are asked for, and {always} are always there; ask for more"),
+        ));
+    }
+    if wanted > path.chosen.len() {
+        return undetermined(format!(
+            "{wanted} functions are asked for, and {samples} samples tell {} of {} apart; take fewer `terms`, or more rows",
+            path.chosen.len(),
+            candidates.count(regressors.len())
+        ));
+    }
+    Ok(())
 }
 
 /// There are not more samples than functions.

@@ -42,7 +42,7 @@ use settings::{Kind, Settings};
 /// variance, the offsets that are taken from the channels (means that are known at the end only), whether a constant is worth its
 /// parameter, the fit one step ahead. So ARX and AR models, and impulse responses with a kernel or without, come out as
 /// [`identify`](super::identify()) finds them on the joined log. ARX models with several outputs ([`of_states`](Self::of_states)) and nonlinear ones of
-/// products that are named ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
+/// products ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
 ///
 /// Sums are in twice the precision, 32 digits, of which a condition number kappa takes 2 log10(kappa): parameters are exact to
 /// eps + 1e-29 kappa^2 (measured: 4e-16 up to kappa = 1e6), in whatever order pieces are merged. The difference to a fit in one pass is
@@ -231,7 +231,9 @@ impl NormalEquations {
         Self::made(settings, &piece, (products, None), totals, &record.segments)
     }
 
-    /// Those of a nonlinear ARX model of products that are named, [`MapPlan::Products`](super::MapPlan::Products), with one output.
+    /// Those of a nonlinear ARX model of products with one output: those that are named, [`MapPlan::Products`](super::MapPlan::Products), or
+    /// as many as are asked for, or have the least of an information criterion, of those up to a degree,
+    /// [`MapPlan::Polynomial`](super::MapPlan::Polynomial). Forward regression needs no more than their sums.
     ///
     /// The plan says channels, lags, expressions, products, offsets and units as for [`fit_nonlinear_arx`](super::fit_nonlinear_arx()). The sums are of
     /// the products and of all parts of them about the means of the piece: so they can be moved to those of all pieces, which are known
@@ -240,7 +242,7 @@ impl NormalEquations {
     ///
     /// # Errors
     /// As for [`new`](Self::new); [`Error::Argument`] for functions whose centres, knots or weights are found from the samples, for products
-    /// that are chosen, and for several outputs.
+    /// of which free runs say how many, and for several outputs.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Rows};

@@ -1,37 +1,37 @@
 //! Products of regressors from their sums alone: the rows are gone.
 
 use super::candidates::Candidates;
-use super::{Solved, TermStep, TermsOutcome, is_dependent, too_few};
+use super::{Count, Solved, TermStep, TermsOutcome, check, is_dependent, too_few};
 use crate::Error;
 use crate::model::{Map, NonlinearArxModel, OutputMap, Parameter};
 use crate::regression::{Column, DividedMonomials, ExtendedGram, Unsolved, forward};
 
-/// The least-squares solution of the products of `head`, a model of one output but its parameters, from sums of deviations in the signals'
-/// own units; and the part that each product has in it.
+/// The least-squares solution of products of the regressors of `head`, a model of one output but its functions, from sums of deviations in
+/// the signals' own units; and how the products were chosen among `candidates`: of `most` steps as many as `count` says.
 ///
 /// The model's regressors and its output are divided by their scales: a parameter is one of the signals as they are, times the scales of
 /// its factors, over that of the output.
 ///
 /// # Errors
-/// [`Error::Undetermined`] if there are not more samples than products, or these depend on one another; [`Error::Data`] if sums leave
-/// the range of numbers.
+/// [`Error::Undetermined`] if there are not more samples than products, these depend on one another, or fewer than asked for can be told
+/// apart; [`Error::Data`] if sums leave the range of numbers.
 pub(crate) fn of_sums(
     head: &NonlinearArxModel,
+    (candidates, most, count): (&Candidates, usize, &Count),
     monomials: &DividedMonomials,
     sums: &ExtendedGram,
 ) -> Result<(Solved, TermsOutcome), Error> {
     let no_products = || Error::argument("map", "it has no products; name some");
-    let Some(OutputMap { functions: map @ Map::Polynomial { terms }, scale, .. }) = head.maps.first() else {
-        return Err(no_products());
+    let (regressors, scale) = (&head.regressors, head.maps.first().map_or(1.0, |map| map.scale));
+    let names: Vec<String> = regressors.iter().map(|one| one.name()).collect();
+    let columns = |map: &Map| -> Option<Vec<Column>> {
+        let Map::Polynomial { terms } = map else { return None };
+        terms.iter().map(|term| monomials.place(term).map(|place| (place, 1.0))).collect()
     };
-    let regressors: Vec<String> = head.regressors.iter().map(|one| one.name()).collect();
-    let (names, count, samples) = (map.names(&regressors), terms.len(), sums.rows());
-    if samples <= count {
-        return Err(too_few(count, samples));
+    let (target, samples, always) = (DividedMonomials::TARGET, sums.rows(), candidates.always());
+    if samples <= always.max(1) {
+        return Err(too_few(always.max(1), samples));
     }
-    let column = |term: &Vec<usize>| monomials.place(term).map(|place| (place, 1.0));
-    let columns: Vec<Column> = terms.iter().map(column).collect::<Option<_>>().ok_or_else(no_products)?;
-    let target = DividedMonomials::TARGET;
     let out_of_range = || {
         Error::data(
             "sums of products of the regressors leave the range of numbers; take products of fewer factors, or scale the channels towards \
@@ -41,37 +41,46 @@ pub(crate) fn of_sums(
     if !sums.is_in_range() {
         return Err(out_of_range());
     }
-    let solved = sums.solve(&columns, target).map_err(|why| match why {
-        Unsolved::Deficient(columns) => {
-            is_dependent(columns.first().map_or("a product", |column| &names[*column]))
-        }
-        Unsolved::Range => out_of_range(),
-    })?;
-    let squares = solved.residual_norm * solved.residual_norm;
-    let variance = squares / (samples - count) as f64;
-
-    // In the order in which they are given.
-    let (gram, cross, energy) = sums.plain(&columns, target);
-    let given: Vec<usize> = (0..count).collect();
-    let path = forward(|one, other| gram[(one, other)], cross.as_slice(), energy, &given, &given, count);
-    let candidates = Candidates::Functions { map: map.clone(), always: count };
+    let every: Vec<usize> = (0..candidates.count(regressors.len())).collect();
+    let all = columns(&candidates.map(&every, regressors.len())).ok_or_else(no_products)?;
+    let (gram, cross, energy) = sums.plain(&all, target);
+    let lags: Vec<usize> = regressors.iter().map(|one| one.lag).collect();
+    let (first, preferred) = (&every[..always], candidates.preferred(&lags));
+    let most = most.max(always).min(samples - 1);
+    let gram = |one: usize, other: usize| gram[(one, other)];
+    let path = forward(gram, cross.as_slice(), energy, first, &preferred, most);
+    check(candidates, &names, samples, &path, count)?;
     let step = |(at, chosen)| {
         let left = path.left(at + 1) * energy / samples as f64;
-        TermStep::of(&candidates, &regressors, chosen, at + 1, left)
+        TermStep::of(candidates, &names, chosen, at + 1, left)
     };
-    let path: Vec<TermStep> = path.chosen.iter().enumerate().map(step).collect();
+    let steps: Vec<TermStep> = path.chosen.iter().enumerate().map(step).collect();
+    let taken = count.best(&steps, always.clamp(1, steps.len()), samples);
+    let places = candidates.ordered(path.places(taken));
+    let map = candidates.map(&places, regressors.len());
     let outcome = TermsOutcome {
-        candidates: count,
-        selected_by: "given".to_owned(),
+        candidates: every.len(),
+        selected_by: match count {
+            Count::Least(criterion) => criterion.word().to_owned(),
+            Count::Given(_) | Count::HeldOut(_) | Count::Blocks => "given".to_owned(),
+        },
         ridge: None,
-        taken: path.len(),
-        path,
+        taken,
+        path: steps,
         training: None,
     };
 
+    let (terms, names) = (columns(&map).ok_or_else(no_products)?, map.names(&names));
+    let solved = sums.solve(&terms, target).map_err(|why| match why {
+        Unsolved::Deficient(terms) => is_dependent(terms.first().map_or("a product", |term| &names[*term])),
+        Unsolved::Range => out_of_range(),
+    })?;
+    let (count, squares) = (terms.len(), solved.residual_norm * solved.residual_norm);
+    let variance = squares / (samples - count) as f64;
+    let Map::Polynomial { terms } = &map else { return Err(no_products()) };
     let units: Vec<f64> = terms
         .iter()
-        .map(|term| term.iter().map(|factor| head.regressors[*factor].scale).product::<f64>() / scale)
+        .map(|term| term.iter().map(|factor| regressors[*factor].scale).product::<f64>() / scale)
         .collect();
     let entry = |i: usize, j: usize| solved.covariance[(i, j)] * units[i] * units[j];
     let each = names.into_iter().enumerate().map(|(place, name)| Parameter {
@@ -85,6 +94,7 @@ pub(crate) fn of_sums(
         degrees_of_freedom: Some(samples - count),
         parameters: each.collect(),
         covariance: (variance > 0.0).then(|| (0..count).map(row).collect()),
+        maps: head.maps.iter().map(|own| OutputMap { functions: map.clone(), ..own.clone() }).collect(),
         ..head.clone()
     };
     let condition = Some(solved.condition).filter(|condition| condition.is_finite());

@@ -263,7 +263,7 @@ impl NonlinearArxPlan {
     }
 
     /// How many steps a choice takes at most.
-    pub(super) fn steps(&self) -> usize {
+    pub(in crate::report) fn steps(&self) -> usize {
         match self.map {
             MapPlan::Local { units, .. } => units.or(self.most).unwrap_or(MOST_LOCAL),
             MapPlan::Products { ref terms } => terms.len(),

@@ -1,4 +1,4 @@
-//! The nonlinear ARX model of known products that normal equations hold.
+//! The nonlinear ARX model of products that normal equations hold.
 
 use std::ops::Range;
 
@@ -12,11 +12,12 @@ use super::super::schema::Report;
 use super::{NormalEquations, Piece, Settings, Totals};
 use crate::Error;
 use crate::data::Offset;
-use crate::estimate::nonlinear_arx::{Joint, of_sums};
+use crate::estimate::nonlinear_arx::{Candidates, Count, Joint, of_sums};
 use crate::estimate::{MapsOutcome, Procedure, out_of_range};
 use crate::model::{ChannelExpression, Map, NonlinearArxModel, Signal};
-use crate::regression::{DividedMonomials, ExtendedGram};
+use crate::regression::{DividedMonomials, ExtendedGram, Monomials};
 use crate::respond::InitialCondition;
+use crate::select::Select;
 
 /// What the sums are about, and between which values they are.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -33,7 +34,8 @@ pub(super) struct Products {
     expressions: Vec<ChannelExpression>,
     /// The model in the signals' own units, without offsets.
     plain: NonlinearArxModel,
-    map: Map,
+    candidates: Candidates,
+    count: Count,
     monomials: DividedMonomials,
     /// The place of the channel of each regressor, and at the end of the output.
     sources: Vec<usize>,
@@ -48,15 +50,28 @@ impl Products {
         let signal = |name: &&str| Signal { name: (*name).to_owned(), offset: Offset::default() };
         let signals = channels.iter().map(|name| ((*name).to_owned(), signal(name))).collect();
         let plain = head(&plan, &signals, &expressions, 1.0, |_, _| Ok(1.0))?;
-        let MapPlan::Products { terms } = &plan.map else {
-            return Err(Error::argument("term", "the products are not given; name them"));
-        };
         let names: Vec<String> = plain.regressors.iter().map(|one| one.name()).collect();
-        let map = Map::products(terms, &names)?;
-        let Map::Polynomial { terms } = &map else {
-            return Err(Error::argument("term", "the functions are no products"));
+        let (candidates, count, terms) = match (&plan.map, plan.terms, plan.select) {
+            (MapPlan::Products { terms }, _, _) => {
+                let (always, map) = (terms.len(), Map::products(terms, &names)?);
+                let Map::Polynomial { terms } = map.clone() else {
+                    return Err(Error::argument("term", "the functions are no products"));
+                };
+                (Candidates::Functions { map, always }, Count::Given(always), terms)
+            }
+            (MapPlan::Polynomial { degree }, terms, select) => {
+                let count = match (terms, select) {
+                    (Some(count), _) => Count::Given(count),
+                    (None, Some(Select::Criterion(criterion))) => Count::Least(criterion),
+                    (None, _) => return Err(Error::argument("select", "it is no information criterion")),
+                };
+                let all = Monomials::new(names.len(), *degree)?;
+                let terms = (0..all.count()).map(|place| all.factors(place)).collect();
+                (Candidates::Products(all), count, terms)
+            }
+            _ => return Err(Error::argument("map", "the functions are no products")),
         };
-        let monomials = DividedMonomials::new(terms, names.len()).ok_or_else(|| {
+        let monomials = DividedMonomials::new(&terms, names.len()).ok_or_else(|| {
             Error::argument(
                 "term",
                 "the products and their parts are more than 1000, whose sums are too many; give fewer, or with fewer factors",
@@ -68,7 +83,7 @@ impl Products {
             .map(|one| one.channel.as_str())
             .chain(plan.outputs.first().map(String::as_str));
         let sources = read.map(|name| channels.iter().position(|own| *own == name).unwrap_or(0)).collect();
-        Ok(Self { plan, expressions, plain, map, monomials, sources })
+        Ok(Self { plan, expressions, plain, candidates, count, monomials, sources })
     }
 
     pub(super) fn columns(&self) -> usize {
@@ -203,10 +218,10 @@ pub(super) fn solve(sums: &NormalEquations, centred: &Centred) -> Result<Report,
     let maps = model.maps.iter_mut().map(|map| &mut map.range);
     let ends = model.regressors.iter_mut().map(|one| &mut one.range).chain(maps);
     ends.zip(ranges).for_each(|(own, range)| *own = range);
-    model.maps.iter_mut().for_each(|map| map.functions = products.map.clone());
 
     let about = products.moved(&sums.products, &centred.centres, &offsets);
-    let (solved, outcome) = of_sums(&model, &products.monomials, &about)?;
+    let choice = (&products.candidates, plan.steps(), &products.count);
+    let (solved, outcome) = of_sums(&model, choice, &products.monomials, &about)?;
     let (samples, mse, parameters) = (about.rows(), solved.mse, solved.model.parameters.len());
     let joint = Joint { model: solved.model, mse, determinant: mse, condition: solved.condition };
     let procedure = Procedure::ForwardRegression(MapsOutcome { maps: vec![outcome] });

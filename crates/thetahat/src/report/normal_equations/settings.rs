@@ -14,7 +14,7 @@ use crate::data::{Detrend, Rows, Split};
 use crate::estimate::{Constant, Initial, Kernel, Method, VectorArxInputs, VectorArxOptions};
 use crate::model::Orders;
 use crate::respond::Horizon;
-use crate::select::Choice;
+use crate::select::{Choice, Select};
 
 /// More rows than any model reaches back to.
 const MOST_LAGS: usize = 100_000;
@@ -52,8 +52,22 @@ pub(super) enum Kind {
         input_lags: Vec<InputLags>,
         expressions: Vec<String>,
         terms: Vec<String>,
+        /// In place of these, those that are chosen.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        chosen: Option<ChosenProducts>,
         raw_terms: bool,
     },
+}
+
+/// Which products of those up to a degree forward regression takes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub(super) struct ChosenProducts {
+    degree: usize,
+    /// How many; none: as many as have the least of the criterion.
+    terms: Option<usize>,
+    criterion: Option<String>,
+    /// How many are looked at, if that is said.
+    most: Option<usize>,
 }
 
 impl Settings {
@@ -141,22 +155,32 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Of a nonlinear ARX model of products that are known.
+    /// Of a nonlinear ARX model of products.
     pub(super) fn of_nonlinear_arx(plan: &NonlinearArxPlan) -> Result<Self, Error> {
         plan.check()?;
-        let terms = match &plan.map {
-            MapPlan::Products { terms } => terms.clone(),
+        let criterion = match plan.select {
+            Some(Select::Criterion(criterion)) => Some(criterion.word().to_owned()),
+            _ => None,
+        };
+        let (terms, chosen) = match &plan.map {
+            MapPlan::Products { terms } => (terms.clone(), None),
+            MapPlan::Polynomial { degree } if plan.terms.is_some() || criterion.is_some() => {
+                let chosen =
+                    ChosenProducts { degree: *degree, terms: plan.terms, criterion, most: plan.most };
+                (Vec::new(), Some(chosen))
+            }
             MapPlan::Polynomial { .. } => {
                 return Err(Error::argument(
-                    "term",
-                    "free runs say which products are chosen, and the log is not read again; name the products",
+                    "select",
+                    "free runs say how many products are taken, and the log is not read again; give an information criterion, such as mdl, \
+                     give `terms`, or name the products",
                 ));
             }
             _ => {
                 return Err(Error::argument(
                     "narx",
                     "centres, knots, boxes and weights are found from the samples, which are not read again; from pieces come models of \
-                     products that are named",
+                     products",
                 ));
             }
         };
@@ -187,6 +211,7 @@ impl Settings {
                 input_lags: plan.input_lags.clone(),
                 expressions: plan.expressions.clone(),
                 terms,
+                chosen,
                 raw_terms: plan.raw_terms,
             },
             detrend: plan.detrend.to_string(),
@@ -197,7 +222,7 @@ impl Settings {
 
     /// The plan that a nonlinear ARX model was made with.
     pub(super) fn nonlinear_plan(&self) -> Result<NonlinearArxPlan, Error> {
-        let Kind::NonlinearArx { outputs, output_lags, input_lags, expressions, terms, raw_terms } =
+        let Kind::NonlinearArx { outputs, output_lags, input_lags, expressions, terms, chosen, raw_terms } =
             &self.kind
         else {
             return Err(Error::argument("map", "the model is not one of products"));
@@ -210,9 +235,20 @@ impl Settings {
             offsets: self.offsets.clone(),
             output_lags: output_lags.clone(),
             input_lags: input_lags.clone(),
-            map: MapPlan::Products { terms: terms.clone() },
             raw_terms: *raw_terms,
-            ..NonlinearArxPlan::new(&[], &[])
+            ..match chosen {
+                None => NonlinearArxPlan {
+                    map: MapPlan::Products { terms: terms.clone() },
+                    ..NonlinearArxPlan::new(&[], &[])
+                },
+                Some(ChosenProducts { degree, terms, criterion, most }) => NonlinearArxPlan {
+                    map: MapPlan::Polynomial { degree: *degree },
+                    terms: *terms,
+                    select: criterion.as_ref().map(|word| word.parse().map(Select::Criterion)).transpose()?,
+                    most: *most,
+                    ..NonlinearArxPlan::new(&[], &[])
+                },
+            }
         })
     }
 
@@ -330,6 +366,9 @@ impl fmt::Display for Kind {
                 let nk = each(&mut delays.iter().map(|delay| delay + first));
                 let inputs = if delays.is_empty() { String::new() } else { format!(", {nb}, {nk}") };
                 write!(formatter, "ARX({}{inputs}) with {} outputs", range(&arx.na), outputs.len())
+            }
+            Self::NonlinearArx { chosen: Some(ChosenProducts { degree, .. }), .. } => {
+                write!(formatter, "NARX polynomial of degree {degree}")
             }
             Self::NonlinearArx { terms, .. } => write!(formatter, "NARX polynomial, {} terms", terms.len()),
         }

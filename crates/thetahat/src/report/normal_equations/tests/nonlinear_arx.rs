@@ -3,6 +3,7 @@
 use super::*;
 use crate::model::Model;
 use crate::report::{InputLags, MapPlan, fit_nonlinear_arx};
+use crate::select::Select;
 
 /// One input, and an output that is far from zero.
 fn log(rows: usize, [level, base, unit]: [f64; 3]) -> Log {
@@ -102,8 +103,23 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
             assert_same(&tree.solve().unwrap(), &all.solve().unwrap(), 1e-12_f64.max(digits / 100.0));
         }
     }
-    // Offsets that are told, with means that are far from them.
+    // Chosen by what they explain, as many as are asked for or as have the least of a criterion.
+    let by =
+        |terms, select| NonlinearArxPlan { map: MapPlan::Polynomial { degree: 3 }, terms, select, ..plan() };
     let log = log(2000, [20.0, -5.0, 3.0]);
+    for plan in [by(Some(5), None), by(None, Some(Select::MDL))] {
+        let whole = fit_nonlinear_arx(&log, &[], &plan).unwrap();
+        let all = merged(&pieces(&log, &plan, &borders));
+        assert_same(&all.solve().unwrap(), &whole, 1e-12);
+        assert_eq!(NormalEquations::from_json(&all.to_json().unwrap()).unwrap(), all);
+        assert_eq!(all.name(), "NARX polynomial of degree 3");
+        let outcome = |report: &Report| {
+            let terms = &report.estimation.procedure.terms()[0];
+            (terms.taken, terms.candidates, terms.selected_by.clone(), terms.path.len())
+        };
+        assert_eq!(outcome(&all.solve().unwrap()), outcome(&whole));
+    }
+    // Offsets that are told, with means that are far from them.
     let told = NonlinearArxPlan { offsets: vec![("u".into(), -4.0), ("y".into(), 20.5)], ..plan() };
     for plan in [told, NonlinearArxPlan { detrend: Detrend::None, ..plan() }] {
         let whole = fit_nonlinear_arx(&log, &[], &plan).unwrap();
@@ -193,8 +209,11 @@ fn what_makes_no_piece_or_does_not_fit_together_is_refused() {
     };
     refused(
         NonlinearArxPlan { map: MapPlan::Polynomial { degree: 2 }, ..plan() },
-        "term: free runs say which",
+        "select: free runs say how many products",
     );
+    let many = NonlinearArxPlan { map: MapPlan::Polynomial { degree: 6 }, terms: Some(3), ..plan() };
+    let many = NonlinearArxPlan { output_lags: vec![5], ..many };
+    refused(many, "the products and their parts are more than 1000");
     refused(NonlinearArxPlan { map: MapPlan::Spline { units: 3 }, ..plan() }, "narx: centres, knots, boxes");
     refused(NonlinearArxPlan { ridge: Some(1.0), ..plan() }, "ridge: normal equations give least squares");
     refused(NonlinearArxPlan { focus: Some(Horizon::FreeRun), ..plan() }, "focus: longer runs read the log");

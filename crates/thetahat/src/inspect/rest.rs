@@ -5,7 +5,7 @@ use std::ops::Range;
 /// An input that changes at most this many times is one of a step test.
 pub(super) const FEW_CHANGES: usize = 5;
 /// And it moves in no more than this part of the rows: a step may take several, noise moves in all of them.
-const MOVES: f64 = 0.25;
+pub(super) const MOVES: f64 = 0.25;
 /// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by: the
 /// difference between the means of the first and the second half.
 const STAYS: f64 = 0.05;

@@ -6,7 +6,7 @@ use super::input::{InputTotals, Twins};
 use super::part::Part;
 use crate::Error;
 use crate::data::{Channel, GAP, Log, Record, Rows};
-use crate::inspect::{DelayEstimate, Feedback, Inspection, InspectionPlan, delay, moments, rest, spectrum};
+use crate::inspect::{DelayEstimate, Feedback, Inspection, InspectionPlan, delay, moments, spectrum};
 use crate::regression::LaggedMoments;
 use crate::select::delays_of;
 use crate::validate::feedback::feedback;
@@ -142,8 +142,8 @@ impl Dynamics {
         if plan.inputs.is_empty() {
             return Ok(());
         }
-        let steps = self.inputs.iter().map(|input| input.steps);
-        if steps.clone().all(|steps| steps <= rest::FEW_CHANGES) && steps.sum::<usize>() > 0 {
+        let stepped = moving.iter().zip(&self.inputs).filter(|(moves, _)| **moves);
+        if stepped.clone().count() > 0 && stepped.clone().all(|(_, input)| input.steps()) {
             inspection.warnings.push(
                 "whether the log is a step test that begins at rest is left out, as that needs all of it at once"
                     .to_owned(),

@@ -4,7 +4,7 @@ use std::slice;
 
 use super::part::Part;
 use crate::inspect::spectrum::Periodograms;
-use crate::inspect::{Excitation, excitation, moments};
+use crate::inspect::{Excitation, excitation, moments, rest};
 use crate::regression::{ExtendedGram, Lagged, LaggedMoments, Presample, Taps};
 
 /// A pair of inputs of which this fraction of the squares differs in any part is not the same.
@@ -22,7 +22,7 @@ pub(super) struct InputTotals {
     changes: usize,
     pairs: usize,
     /// How often it leaves a value that it held.
-    pub(super) steps: usize,
+    steps: usize,
     total: f64,
     count: f64,
 }
@@ -80,6 +80,12 @@ impl InputTotals {
             }
         }
         self.ahead = ahead;
+    }
+
+    /// Whether it changes as that of a step test does.
+    pub(super) fn steps(&self) -> bool {
+        let few = self.changes as f64 <= rest::MOVES * self.count;
+        self.changes > 0 && self.steps <= rest::FEW_CHANGES && few
     }
 
     /// What it excites; none of its rows follow. `moves`: whether it is not constant to rounding.

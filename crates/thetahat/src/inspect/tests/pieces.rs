@@ -185,6 +185,19 @@ fn what_the_clock_forbids_is_named() {
 }
 
 #[test]
+fn a_step_test_is_named_and_no_other_log() {
+    let noise = normal(13, 4000);
+    let ramp: Vec<f64> = noise.iter().enumerate().map(|(row, x)| row as f64 + 0.01 * x).collect();
+    let steps: Vec<f64> = (0..4000).map(|row| f64::from(row / 1500)).collect();
+    for (input, named) in [(steps, true), (ramp, false), (noise.clone(), false), (vec![2.0; 4000], false)] {
+        let output = sum_of(&late(&input, 1), 0.1, &noise);
+        let channels = vec![("u", input), ("y", output)];
+        let [_, pieces] = both(&channels, None, &plan(&["u"], Some("y")), &[2000]);
+        assert_eq!(pieces.warnings.iter().any(|words| words.contains("begins at rest")), named);
+    }
+}
+
+#[test]
 fn levels_that_move_cost_no_digits() {
     // The first part rests at zero; then the plant runs at a level a million deviations above.
     let [input, mut output] = [normal(11, 9000), normal(12, 9000)];

@@ -78,7 +78,7 @@ const PYTHON: House = House {
         &["grey_box", "log"],
         &["model"],
         &["online"],
-        &["design", "evaluation", "filter", "normal_equations", "track"],
+        &["design", "evaluation", "experiments", "filter", "normal_equations", "track"],
     ],
 };
 

@@ -2,8 +2,9 @@
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::likelihood::LikelihoodSums;
-use super::message::{AboutErrors, Answer, Asked, Factor, Found, ModelErrors, Point, Question, Sums};
+use super::message::{
+    AboutErrors, Answer, Asked, Factor, Found, LikelihoodSums, ModelErrors, Point, Question, Sums,
+};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::arx::rows;

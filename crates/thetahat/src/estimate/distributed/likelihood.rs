@@ -1,24 +1,10 @@
 //! The likelihood of a model in equations over experiments that others hold too: its value and its slopes are sums over them.
 
-use serde::{Deserialize, Serialize};
-
 use super::Holders;
-use super::message::{Asked, Found};
+use super::message::{Asked, Found, LikelihoodSums};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective, Slopes};
 use crate::model::GreyBox;
 use crate::respond::equations::{Experiment, Failure};
-
-/// What the experiments of one holder say of a point.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in crate::estimate) enum LikelihoodSums {
-    Value(f64),
-    Slopes(Slopes),
-    /// The experiment, counted from the holder's first one, and its row in which the filter does not work.
-    Failure {
-        log: usize,
-        row: usize,
-    },
-}
 
 impl LikelihoodSums {
     pub(super) fn new(model: &GreyBox, experiments: &[Experiment], z: &[f64], slopes: bool) -> Self {

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::likelihood::LikelihoodSums;
 use crate::Error;
+use crate::estimate::equations::Slopes;
 use crate::estimate::predictor::InitialCondition;
 use crate::estimate::uncertainty::ErrorProducts;
 use crate::model::Orders;
@@ -144,4 +144,16 @@ pub(super) struct Factor {
     pub(super) rotated: Vec<f64>,
     pub(super) residual_norm: f64,
     pub(super) rows: usize,
+}
+
+/// What the experiments of one holder say of a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum LikelihoodSums {
+    Value(f64),
+    Slopes(Slopes),
+    /// The experiment, counted from the holder's first one, and its row in which the filter does not work.
+    Failure {
+        log: usize,
+        row: usize,
+    },
 }

@@ -3,7 +3,7 @@
     python benches/peers/many_logs.py [LOGS] [PIECES] [ROWS]
 
 10,000 logs of 1000 rows, among which 1 % are broken, get an ARX model each, chosen among 100; an ARX(8, 8) model is made of as many
-pieces of 10^6 rows in files of Parquet; 50 experiments of 1000 rows, and of ROWS (400,000), are fitted one OE(2, 2) model. Prints times, ratios and memory. Needs the wheel of `make wheel` and its extra [dask].
+pieces of 10^6 rows in files of Parquet; 50 experiments of 1000 rows, and of ROWS (100,000), are fitted one OE(2, 2) model. Prints times, ratios and memory. Needs the wheel of `make wheel` and its extra [dask].
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def one_search(folder: Path, rows: int) -> None:
 
 
 if __name__ == "__main__":
-    logs, pieces, rows = (int(word) for word in [*sys.argv[1:], *["10000", "100", "400000"][len(sys.argv) - 1 :]])
+    logs, pieces, rows = (int(word) for word in [*sys.argv[1:], *["10000", "100", "100000"][len(sys.argv) - 1 :]])
     os.environ["OMP_NUM_THREADS"] = "1"
     with tempfile.TemporaryDirectory() as name:
         if logs:

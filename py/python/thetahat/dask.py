@@ -49,6 +49,8 @@ _TASKS = 16
 """A task has one log unless each worker has more tasks than this: the scheduler takes some milliseconds for a task."""
 _MOST = 32
 """The logs of a task, at most: so many are done again when a worker is lost."""
+_SHORT = 1 << 18
+"""Fewer rows in all are fetched: a message takes as long as an iteration on them."""
 _FRONT = 16
 """Rows at the front of some pieces beside those that the model reaches back to: their steps are its sample time."""
 
@@ -269,17 +271,17 @@ def fit_experiments(
     if fit is grey:
         return told(_equations(work, runs, bound.arguments), stacklevel=3)
     own = words(fit.__name__, bound.arguments)
-    described = dask.persist(*[dask.delayed(_experiments)(work, run, own) for run in runs])
-    texts = dask.compute(*[part[1] for part in described])
-    first, *others = [_thetahat.Experiments.from_json(text) for text in texts]
+    held = dask.persist(*[dask.delayed(_experiments)(work, run, own) for run in runs])
+    known = dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])
+    first, *others = [_thetahat.Experiments.from_json(text) for text, _ in known]
     every = first.merged(others)
     offsets = every.offsets(own)
     if every.are_fetched:
-        near = [_deviations(part, own, offsets) for part in dask.compute(*described)]
+        logs = [log for _, log in known]
+        near = [_deviations(log, own, offsets) for log in (logs if all(logs) else dask.compute(*[part[0] for part in held]))]
         found = every.fit(own, lambda questions: [_answer(log, own, question) for log, question in zip(near, questions)])
     else:
-        held = dask.persist(*[dask.delayed(_deviations)(part, own, offsets) for part in described])
-        del described
+        held = dask.persist(*[dask.delayed(_deviations)(part[0], own, offsets) for part in held])
         found = every.fit(own, _asking(_answer, held, own))
     return told(Model._of(found), stacklevel=3)
 
@@ -352,8 +354,13 @@ def _answer_equations(log: Log, box: GreyBox, question: bytes) -> bytes:
         return _thetahat.answer_equations(log._log, box._model, question)
 
 
-def _deviations(part: tuple[Log, str], own: Sequence[str], offsets: Sequence[float]) -> Log:
-    log, _ = part
+def _described(part: tuple[Log, str], count: int) -> tuple[str, Log | None]:
+    """What is known of some experiments, and they themselves where so many as short as these are fetched."""
+    log, text = part
+    return text, log if count * len(log) < _SHORT else None
+
+
+def _deviations(log: Log, own: Sequence[str], offsets: Sequence[float]) -> Log:
     with _shared():
         return Log._of(_thetahat.deviations(log._log, own, offsets), log._clock)
 

@@ -277,7 +277,8 @@ def test_experiments_that_cannot_be_meant_are_refused(client: Any) -> None:
     good = MOTOR[:400]
     gone = th.Log(np.full(100, np.nan), np.arange(100.0), sample_time=0.01)
     assert refusal({"good": good, "gone": gone}).startswith("gone: no row has a value")
-    assert "sample time" in refusal({"good": good, "slow": th.Log(good["y"], good["u"], sample_time=0.02)})
+    slow = th.Log(good["y"], good["u"], sample_time=0.02)
+    assert refusal({"good": good, "slow": slow}).startswith("slow: the second experiments have a sample time of 0.02 s")
     assert "given twice" in refusal([good, good])
     assert "all rows serve" in refusal([good], estimate="1..100")
     assert "fits no one model" in refusal([good], th.search)

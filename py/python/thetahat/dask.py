@@ -273,8 +273,7 @@ def fit_experiments(
     own = words(fit.__name__, bound.arguments)
     held = dask.persist(*[dask.delayed(_experiments)(work, run, own) for run in runs])
     known = dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])
-    first, *others = [_thetahat.Experiments.from_json(text) for text, _ in known]
-    every = first.merged(others)
+    every = _together([(run[0][0], _thetahat.Experiments.from_json(text)) for run, (text, _) in zip(runs, known)])
     offsets = every.offsets(own)
     if every.are_fetched:
         logs = [log for _, log in known]
@@ -332,15 +331,25 @@ def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None, finer: 
 
 def _experiments(work: _many.Work, run: Sequence[tuple[str, Any]], own: Sequence[str]) -> tuple[Log, str]:
     """Some experiments as one log, and what is known of them."""
-    logs, described = [], []
+    logs: list[Log] = []
+    described = []
     with _shared():
         for name, item in run:
             log = _loaded(work, name, item)
             with _in_piece(name):
-                described.append(_thetahat.Experiments(log._log, own))
+                described.append((name, _thetahat.Experiments(log._log, own)))
             logs.append(log)
-        every = described[0].merged(described[1:]).joined()
+        every = _together(described).joined()
         return Log.join(logs), every.to_json()
+
+
+def _together(described: Sequence[tuple[str, _thetahat.Experiments]]) -> _thetahat.Experiments:
+    """All experiments as one model sees them; errors name the one that does not fit."""
+    (_, every), *others = described
+    for name, own in others:
+        with _in_piece(name):
+            every = every.merged([own])
+    return every
 
 
 def _joined(work: _many.Work, run: Sequence[tuple[str, Any]]) -> Log:

@@ -224,7 +224,8 @@ def test_a_search_over_experiments(client: Any) -> None:
     with dask.config.set(scheduler="synchronous"):
         assert thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json() == model.to_json()
     short = {name: log[:300] for name, log in logs.items()}
-    for fit, orders in [(th.armax, {"na": 2, "nb": 2, "nc": 2}), (th.arx, {"na": 2, "nb": 2})]:
+    cases: list[tuple[Any, dict[str, Any]]] = [(th.armax, {"na": 2, "nb": 2, "nc": 2}), (th.arx, {"na": 2, "nb": 2})]
+    for fit, orders in cases:
         expected = fit(th.Log.join(list(short.values())), **orders)
         found = thetahat.dask.fit_experiments(short, fit, **orders)
         assert np.allclose(found.parameters, expected.parameters, rtol=1e-8, atol=0)

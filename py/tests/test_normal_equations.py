@@ -138,8 +138,8 @@ def test_several_outputs(two: th.Log, orders: dict[str, Any]) -> None:
                   found.document["estimation"][matrix] + whole.document["estimation"][matrix]]
         half = len(values) // 2
         np.testing.assert_allclose(np.concatenate(values[:half]), np.concatenate(values[half:]), rtol=1e-12, atol=1e-13)
-    covariances = [model.document["model"]["noise_covariance"] for model in (found, whole)]
-    np.testing.assert_allclose(*covariances, rtol=1e-12, atol=1e-15)
+    one, other = (model.document["model"]["noise_covariance"] for model in (found, whole))
+    np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-15)
     np.testing.assert_allclose(found.simulate(np.ones((50, 2))), whole.simulate(np.ones((50, 2))), rtol=1e-10)
     assert [fit["output"] for fit in found.fits] == ["y1", "y2"] and found.samples == whole.samples
     assert repr(both).endswith("2000 rows in 2 pieces, inputs u1, u2, outputs y1, y2)")

@@ -193,7 +193,8 @@ fn an_inspection_of_a_stream_tells_what_the_whole_tells() {
     assert_eq!((&stream["delays"][0]["nk"], &whole["delays"][0]["nk"]), (&json!(1), &json!(1)));
     assert_eq!(stream["command"], whole["command"]);
     let words = stream["warnings"].to_string();
-    assert!(words.contains("those of the first 100000 rows") && words.contains("is left out"), "{words}");
+    // An input that does not step is not that of a step test, of which the rest before it would be missed.
+    assert!(words.contains("those of the first 100000 rows") && !words.contains("left out"), "{words}");
     // A pipe gives the same bytes, and the number of threads does not matter.
     let piped = folder.run_on("inspect - --stream --format json", folder.read("log.csv"));
     let mut command = folder.command("inspect log.csv --stream --format json");

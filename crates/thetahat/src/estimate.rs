@@ -307,21 +307,28 @@ pub fn estimate_monitored(
 }
 
 /// The same with the inputs' names, which bounds on their static gains use. The last inputs may have none: those of a constant
-/// and a trend.
+/// and a trend. Data that are not at hand are for a search of prediction errors.
 pub(crate) fn estimate_of_channels(
-    record: &Record<'_>,
+    data: &impl ExperimentData,
     inputs: &[String],
     orders: &Orders,
     method: &Method,
     initial: Initial,
     monitor: Monitor<'_>,
 ) -> Result<Estimate, Error> {
-    match method {
-        Method::PredictionError(search) if search.plant_first && orders.structure() != Structure::Oe => {
-            plant_first::plant_first(record, inputs.len(), orders, initial, search, monitor)
+    let of_plant = |search: &Search| search.plant_first && orders.structure() != Structure::Oe;
+    let record = match (method, data.record()) {
+        (Method::PredictionError(search), record) if record.is_none() || !of_plant(search) => {
+            return prediction_error::prediction_error(data, orders, initial, search, monitor);
         }
+        (_, Some(record)) => record,
+        (_, None) => {
+            return Err(Error::argument("method", "experiments that others hold are fitted by a search"));
+        }
+    };
+    match method {
         Method::PredictionError(search) => {
-            prediction_error::prediction_error(record, orders, initial, search, monitor)
+            plant_first::plant_first(record, inputs.len(), orders, initial, search, monitor)
         }
         Method::Regularised(kernel) => {
             impulse_response::impulse_response(record, inputs.len(), orders, initial, *kernel)

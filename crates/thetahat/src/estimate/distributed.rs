@@ -18,9 +18,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use super::experiment_data::ExperimentData;
-use super::prediction_error::prediction_error;
 use super::predictor::InitialCondition;
-use super::{Estimate, Initial, Method, Monitor};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -50,7 +48,7 @@ impl<'a> Holders<'a> {
         Self { ask, count, failed: RefCell::new(None), latest: RefCell::default() }
     }
 
-    /// What made an answer fail, if one did: nothing that was found since then is of any worth.
+    /// What made an answer fail, if one did: nothing that was found since then is of any worth. Whoever takes it gives it on.
     pub(crate) fn failure(&self) -> Option<Error> {
         self.failed.take()
     }
@@ -189,23 +187,6 @@ impl ExperimentData for Distributed<'_> {
 
     fn errors<'e>(&'e self, orders: &Orders, begin: InitialCondition) -> DistributedErrors<'e> {
         DistributedErrors::new(self, orders, begin)
-    }
-
-    fn estimate(
-        &self,
-        _: &[String],
-        orders: &Orders,
-        method: &Method,
-        initial: Initial,
-        monitor: Monitor<'_>,
-    ) -> Result<Estimate, Error> {
-        let found = match method {
-            Method::PredictionError(search) if !orders.is_linear() => {
-                prediction_error(self, orders, initial, search, monitor)
-            }
-            _ => Err(Error::argument("method", "experiments that others hold are fitted by a search")),
-        };
-        self.holders.failure().map_or(found, Err)
     }
 
     fn energy(&self) -> f64 {

@@ -8,7 +8,6 @@ use super::polynomials::Unusable;
 use super::predictor::{InitialCondition, Predictor};
 use super::stretches::{energy, thinned};
 use super::uncertainty::{Autoregression, autoregression, restricted};
-use super::{Estimate, Initial, Method, Monitor, estimate_of_channels};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -40,19 +39,6 @@ pub(crate) trait ExperimentData {
 
     /// Their prediction errors as a function of the parameters.
     fn errors<'e>(&'e self, orders: &Orders, begin: InitialCondition) -> Self::Errors<'e>;
-
-    /// The estimate of a method, see [`estimate_of_channels`].
-    ///
-    /// # Errors
-    /// As there.
-    fn estimate(
-        &self,
-        inputs: &[String],
-        orders: &Orders,
-        method: &Method,
-        initial: Initial,
-        monitor: Monitor<'_>,
-    ) -> Result<Estimate, Error>;
 
     /// The sum of squares of the output.
     fn energy(&self) -> f64;
@@ -119,17 +105,6 @@ impl ExperimentData for Record<'_> {
 
     fn errors<'e>(&'e self, orders: &Orders, begin: InitialCondition) -> Predictor<'e> {
         Predictor::new(self, orders, begin)
-    }
-
-    fn estimate(
-        &self,
-        inputs: &[String],
-        orders: &Orders,
-        method: &Method,
-        initial: Initial,
-        monitor: Monitor<'_>,
-    ) -> Result<Estimate, Error> {
-        estimate_of_channels(self, inputs, orders, method, initial, monitor)
     }
 
     fn energy(&self) -> f64 {

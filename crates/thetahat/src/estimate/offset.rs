@@ -41,7 +41,10 @@ use serde::{Deserialize, Serialize};
 
 use super::experiment_data::ExperimentData;
 use super::predictor::InitialCondition;
-use super::{ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, exact, prediction_error};
+use super::{
+    ConvexFit, Estimate, Initial, Method, Monitor, Procedure, Search, arx, estimate_of_channels, exact,
+    prediction_error,
+};
 use crate::Error;
 use crate::data::Offset;
 use crate::estimate::Criteria;
@@ -244,7 +247,7 @@ impl<D: ExperimentData> Task<'_, D> {
     fn plain(&self, start: Option<Vec<f64>>) -> Result<Fitted, Error> {
         let method = starting_from(self.method, start);
         let Self { data, inputs, orders, initial, monitor, .. } = *self;
-        let estimate = data.estimate(inputs, orders, &method, initial, monitor)?;
+        let estimate = estimate_of_channels(data, inputs, orders, &method, initial, monitor)?;
         Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None, open: None })
     }
 
@@ -291,7 +294,7 @@ impl<D: ExperimentData> Task<'_, D> {
             Initial::Auto if self.orders.na > 0 && orders.nf.iter().any(|&nf| nf > 0) => Initial::Estimate,
             initial => initial,
         };
-        data.estimate(self.inputs, &orders, &method, initial, self.monitor)
+        estimate_of_channels(&data, self.inputs, &orders, &method, initial, self.monitor)
     }
 
     /// What an estimate without a constant leaves open of an offset that was taken off before, as a mean or a line: the covariance

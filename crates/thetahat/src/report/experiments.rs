@@ -32,7 +32,12 @@ use crate::select::{Choice, Focus};
 /// [`identify`](super::identify()) finds in the joined log, but for the order in which sums are added. Starts are found in some rows of all:
 /// logs of fewer than 262,144 rows together are fetched whole.
 ///
-/// Each holder's work in an iteration is O(N p) for its N rows, and p^2 + n (p + 1) numbers come from it, for n initial conditions.
+/// ```text
+/// J = sum e^2,   g = sum psi e,   G = sum psi psi',   psi = -de/dtheta
+/// ```
+///
+/// over all samples of all experiments, with psi less what the initial conditions of its experiment explain of it (Ljung, System
+/// Identification, 2nd ed. 1999, section 10.2). Each holder's work in an iteration is O(N p) for its N rows, and p^2 + n (p + 1) numbers come from it, for n initial conditions.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};

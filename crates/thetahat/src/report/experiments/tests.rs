@@ -259,3 +259,35 @@ fn a_holder_that_is_lost_in_the_middle_ends_it() {
     };
     assert!(all.fit(&plan, &ask, &|_| ControlFlow::Continue(())).is_err());
 }
+
+#[test]
+fn a_failure_that_passes_is_no_model_of_less() {
+    // With a level that pays, of which the mean of so few experiments is not it.
+    let logs: Vec<Log> = (0..3).map(|seed| log(seed, 88_000, 0.0)).collect();
+    let plan = plan(Orders::oe(&[2], &[2], &[1]).unwrap());
+    let mut all = Experiments::new(&logs[0], &[], &plan).unwrap();
+    for log in &logs[1..] {
+        all.merge(&Experiments::new(log, &[], &plan).unwrap()).unwrap();
+    }
+    let offsets = all.offsets(&plan).unwrap();
+    let held: Vec<Log> =
+        logs.iter().map(|log| Experiments::deviations(log, &plan, &offsets).unwrap()).collect();
+    let fit = |fails: usize| {
+        let asked = std::cell::Cell::new(0);
+        let ask = |questions: &[Question]| {
+            asked.set(asked.get() + 1);
+            if asked.get() == fails {
+                return Err(Error::data("the worker is away for a moment"));
+            }
+            let each = held.iter().zip(questions);
+            each.map(|(log, question)| Experiments::answer(log, &plan, question)).collect()
+        };
+        (all.fit(&plan, &ask, &|_| ControlFlow::Continue(())), asked.get())
+    };
+    let (found, count) = fit(0);
+    assert!(found.is_ok() && count > 8, "{count}");
+    for fails in 1..=count {
+        let error = fit(fails).0.unwrap_err().to_string();
+        assert!(error.contains("for a moment"), "{fails}: {error}");
+    }
+}

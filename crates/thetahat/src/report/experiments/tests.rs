@@ -262,9 +262,10 @@ fn a_holder_that_is_lost_in_the_middle_ends_it() {
 
 #[test]
 fn a_failure_that_passes_is_no_model_of_less() {
-    // With a level that pays, of which the mean of so few experiments is not it.
+    // What is left of the mean of u asks for a constant.
     let logs: Vec<Log> = (0..3).map(|seed| log(seed, 88_000, 0.0)).collect();
     let plan = plan(Orders::oe(&[2], &[2], &[1]).unwrap());
+    let plan = Plan { offsets: vec![("u".into(), 1.9)], ..plan };
     let mut all = Experiments::new(&logs[0], &[], &plan).unwrap();
     for log in &logs[1..] {
         all.merge(&Experiments::new(log, &[], &plan).unwrap()).unwrap();
@@ -285,8 +286,8 @@ fn a_failure_that_passes_is_no_model_of_less() {
         (all.fit(&plan, &ask, &|_| ControlFlow::Continue(())), asked.get())
     };
     let (found, count) = fit(0);
-    assert!(found.is_ok() && count > 8, "{count}");
-    for fails in 1..=count {
+    assert!(found.is_ok_and(|found| found.estimation.level.is_some()));
+    for fails in (1..=count).rev().step_by(3) {
         let error = fit(fails).0.unwrap_err().to_string();
         assert!(error.contains("for a moment"), "{fails}: {error}");
     }

@@ -18,8 +18,8 @@ use crate::log::{self, Piece};
 /// A model whose normal equations are sums over parts of the logs.
 pub(crate) enum PiecesJob {
     Linear(Box<FitJob>),
-    /// With several outputs.
-    VectorArx(Box<StateSpaceJob>),
+    /// Of a subspace method, or an ARX model with several outputs.
+    StateSpace(Box<StateSpaceJob>),
     NonlinearArx(Box<NarxJob>),
 }
 
@@ -33,14 +33,7 @@ impl PiecesJob {
             return Ok(Self::NonlinearArx(Box::new(NarxJob::resolve(arguments, map)?)));
         }
         if let Some(job) = StateSpaceJob::resolve(arguments, has_several)? {
-            return if job.is_arx() {
-                Ok(Self::VectorArx(Box::new(job)))
-            } else {
-                Err(Failure::usage(
-                    "--stream is for ARX and AR models, nonlinear ones of products, and impulse responses: the states of a subspace method are evaluated on the log, \
-                     which is not read again; leave it out",
-                ))
-            };
+            return Ok(Self::StateSpace(Box::new(job)));
         }
         let job = FitJob::resolve(arguments)?;
         job.check_output()?;
@@ -50,7 +43,7 @@ impl PiecesJob {
     fn logs(&self) -> (&[PathBuf], &LogJob) {
         match self {
             Self::Linear(job) => (&job.paths, &job.log),
-            Self::VectorArx(job) => (&job.paths, &job.log),
+            Self::StateSpace(job) => (&job.paths, &job.log),
             Self::NonlinearArx(job) => (&job.paths, &job.log),
         }
     }
@@ -58,7 +51,7 @@ impl PiecesJob {
     fn wanted(&self) -> Wanted<'_> {
         match self {
             Self::Linear(job) => wanted(job),
-            Self::VectorArx(job) => state_space::wanted(job),
+            Self::StateSpace(job) => state_space::wanted(job),
             Self::NonlinearArx(job) => narx::wanted(job),
         }
     }
@@ -86,7 +79,7 @@ impl PiecesJob {
                 };
                 (lags, Box::new(move |log, sources, past| NormalEquations::new(log, sources, &plan, past)))
             }
-            Self::VectorArx(job) => {
+            Self::StateSpace(job) => {
                 let plan = job.plan(channels.inputs, channels.outputs)?;
                 let lags = plan.lags();
                 let made = move |log: &Log, sources: &[Source], past| {

@@ -148,11 +148,6 @@ impl StateSpaceJob {
         }))
     }
 
-    /// Whether the model is an ARX model.
-    pub(crate) fn is_arx(&self) -> bool {
-        self.plan.arx.is_some()
-    }
-
     /// The plan for the channels of a log. Without feedthrough an input acts one sample later by itself.
     pub(crate) fn plan(&self, inputs: Vec<String>, outputs: Vec<String>) -> Result<StateSpacePlan, Failure> {
         let count = inputs.len();

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use thetahat::Document;
-use thetahat::report::NormalEquations as Sums;
+use thetahat::estimate::SubspaceOptions;
+use thetahat::report::{NormalEquations as Sums, StateSpacePlan};
 
 use crate::error;
 use crate::log::Log;
@@ -27,6 +28,20 @@ impl NormalEquations {
         let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
         let made = interruptible(py, move |_| making(&channels, &sources, past))?;
         Ok(Self(Arc::new(made)))
+    }
+
+    /// How many rows a state-space model of a subspace method with these options reaches back to.
+    #[staticmethod]
+    fn lags_of_states(
+        py: Python<'_>,
+        weighting: Option<&str>,
+        past: Option<usize>,
+        future: Option<usize>,
+    ) -> PyResult<usize> {
+        let weighting = weighting.map(str::parse).transpose().map_err(|error| error::batch(py, error))?;
+        let weighting = weighting.unwrap_or_default();
+        let subspace = SubspaceOptions { weighting, past, future, ..SubspaceOptions::default() };
+        Ok(StateSpacePlan { subspace, ..StateSpacePlan::new(&[], &[]) }.lags())
     }
 
     /// Reads the document back.

@@ -167,6 +167,20 @@ def test_one_model_of_several_outputs(client: Any) -> None:
         np.testing.assert_allclose(found.document["model"][name], whole.document["model"][name], rtol=1e-11, atol=1e-13)
     with pytest.raises(ValueError, match="^b: "):
         thetahat.dask.normal_equations({"a": log[:500], "b": log[500:].select(output="y1")}, **orders).compute()
+    # States, of one log and of experiments.
+    states: dict[str, Any] = {"order": 3, "horizons": (10, None), "nk": 1}
+    found = thetahat.dask.normal_equations(pieces, **states).compute().solve()
+    close_states(found, th.ss(log, 3, past=10, nk=1))
+    found = thetahat.dask.fit_experiments(pieces, th.ss, order=range(1, 4), nk=1)
+    close_states(found, th.ss(th.Log.join(pieces), order=range(1, 4), nk=1))
+    with pytest.raises(ValueError, match="refine: the model is made in one pass"):
+        thetahat.dask.fit_experiments(pieces, th.ss, refine="prediction")
+
+
+def close_states(found: th.Model, whole: th.Model) -> None:
+    assert found.name == whole.name
+    steps = [one.simulate(np.ones(50)) for one in (found, whole)]
+    np.testing.assert_allclose(steps[0], steps[1], rtol=1e-11, atol=1e-12)
 
 
 def test_one_nonlinear_model(client: Any) -> None:

@@ -192,6 +192,50 @@ def test_products_of_other_kinds_are_refused(log: th.Log, two: th.Log) -> None:
         th.NormalEquations(log[:999], terms=["y(k-1)"]).merge(th.NormalEquations(log[999:], terms=["y(k-2)"]))
 
 
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"order": range(1, 8), "nk": [1, 2]},
+        {"order": 4, "weighting": "cva", "past": 8, "future": 6, "feedthrough": False, "constant": "yes"},
+    ],
+)
+def test_states(two: th.Log, options: dict[str, Any]) -> None:
+    own = dict(options)
+    horizons = own.pop("past", None), own.pop("future", None)
+    orders: dict[str, Any] = {"order": "auto", "horizons": horizons, **own}
+    lags = th.NormalEquations(two[:500], **orders).lags
+    first = th.NormalEquations(two[:1000], **orders)
+    second = th.NormalEquations(two[1000 - lags :], past=lags, **orders)
+    both = pickle.loads(pickle.dumps(first | second))
+    assert both == first | second and repr(both).startswith("NormalEquations(state space")
+    found, whole = both.solve(), th.ss(two, **options)
+    assert found.name == whole.name and found.samples > 1850
+    np.testing.assert_allclose(found.simulate(np.ones((50, 2))), whole.simulate(np.ones((50, 2))), rtol=1e-12)
+    for one, other in zip(found.fits, whole.fits):
+        assert one["percent"] == pytest.approx(other["percent"], abs=0.3)
+
+
+def test_states_that_cannot_be_found_are_refused(log: th.Log, two: th.Log) -> None:
+    refused: list[tuple[dict[str, Any], type[Exception], str]] = [
+        ({"order": 2, "na": 2}, ValueError, "na: it is not of state-space models"),
+        ({"na": 2, "nb": 2, "weighting": "cva"}, ValueError, "weighting: it is for state-space models"),
+        ({"order": "all"}, TypeError, "order: expected an int"),
+        ({"order": 0}, ValueError, "order"),
+        ({"order": 2, "horizons": 3}, TypeError, "horizons: expected two"),
+        ({"order": 2, "horizons": (0, None)}, ValueError, "horizons"),
+        ({"order": 2, "weighting": "pca"}, ValueError, "'pca' is none; there are ssarx"),
+        ({"order": 2, "past": 9}, ValueError, "past: 9 rows are fewer than the 50"),
+        ({"order": 2, "horizons": (10**6, None)}, ValueError, "1000000 is not in 1..=1000"),
+    ]
+    for arguments, kind, message in refused:
+        with pytest.raises(kind, match=message):
+            th.NormalEquations(two, **arguments)
+    with pytest.raises(th.EstimationError, match="lagged signals"):
+        th.NormalEquations(log[:9], order=2).solve()
+
+
 def test_several_outputs_without_inputs(two: th.Log) -> None:
     sums = th.NormalEquations(two, na=2)
     assert repr(sums) == "NormalEquations(ARX(2) with 2 outputs, 2000 rows in 1 piece, no inputs, outputs y1, y2)"
@@ -254,7 +298,7 @@ def test_what_makes_no_piece_is_refused(log: th.Log) -> None:
         ({"na": 2, "nb": 2, "past": 1}, "past: 1 rows are fewer than the 2"),
         ({"na": 2, "nb": 2, "past": 3000}, "past: all 3000 rows of the piece"),
         ({"na": 2, "nb": 2, "past": -1}, "past: -1 is below 0"),
-        ({}, "na: give the orders na and nb, or taps, or terms"),
+        ({}, "na: give the orders na and nb, or taps, terms or an order"),
         ({"na": 2, "taps": 10}, "taps: an impulse response has neither na nor nb"),
         ({"na": 2, "nk": 1}, "nk: it is for inputs"),
         ({"na": 2, "ny": 1}, "ny: it is for products; give terms too"),

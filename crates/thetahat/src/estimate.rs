@@ -102,10 +102,13 @@ pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
 pub(crate) use stretches::{seen_by_starts, stretches};
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
-pub(crate) use subspace::{Ordered, products_of_innovations, with_levels};
+pub(crate) use subspace::{
+    Ordered, SegmentStart, SubspaceErrors, SubspaceSums, joint_products, joint_taps, products_of_innovations,
+    with_levels,
+};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
-pub(crate) use vector_arx::{VectorArxEstimate, joint_products, joint_taps, vector_arx, vector_arx_of_sums};
+pub(crate) use vector_arx::{VectorArxEstimate, vector_arx, vector_arx_of_sums};
 
 /// How an estimate was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -11,6 +11,7 @@ from thetahat._log import Log, handle
 from thetahat._model import Model
 from thetahat._narx import Lags
 from thetahat._options import FitOptions, NarxOptions, Order, Orders
+from thetahat._state_space import subspace_words
 
 
 class NormalEquations:
@@ -25,7 +26,8 @@ class NormalEquations:
     are gaps as in any log.
 
     Of a log with several outputs the model is that of `thetahat.arx` with polynomials of matrices. Its orders may be ranges: the sums are
-    the normal equations of each, and the least MDL chooses when they are solved.
+    the normal equations of each, and the least MDL chooses when they are solved. With ``order`` it is a state-space model, that of
+    `thetahat.ss`, of any number of outputs.
 
     Parameters
     ----------
@@ -56,6 +58,13 @@ class NormalEquations:
         With terms: expressions of the channels that these read too, see `thetahat.NarxOptions`.
     raw_terms : bool, default False
         With terms: whether signals keep their own units; else each is divided by its standard deviation over all pieces.
+    order : int, range or "auto", optional
+        In place of na and nb: how many states a state-space model has, or among how many the least MDL chooses; ``"auto"`` are 1 to 20.
+    weighting, feedthrough : optional
+        With order: how the states are found, see `thetahat.ss`.
+    horizons : tuple of int or None, optional
+        With order: the past samples that the states are made of and the future ones that they tell of, ``past`` and ``future`` of
+        `thetahat.ss`.
     couple : {"full", "none", "auto"}, optional
         With several outputs: whether an output depends on the past of all or of its own, see `arx`.
     detrend : {"mean", "none"}, optional
@@ -115,14 +124,31 @@ class NormalEquations:
         nu: Lags | None = None,
         regressors: Sequence[str] | None = None,
         raw_terms: bool = False,
+        order: int | range | str | None = None,
+        weighting: str | None = None,
+        feedthrough: bool | None = None,
+        horizons: tuple[int | None, int | None] | None = None,
         couple: str | None = None,
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
         constant: str | None = None,
     ) -> None:
         data = handle("log", log)
+        found: dict[str, Any] = {"weighting": weighting, "feedthrough": feedthrough, "horizons": horizons}
+        if order is not None:
+            others = {"na": na, "nb": nb, "taps": taps, "terms": terms, "select": select, "couple": couple}
+            for name, value in others.items():
+                if value is not None:
+                    raise ValueError(f"{name}: it is not of state-space models; leave it or the order out")
+            words = subspace_words(order, nk, weighting, *both_horizons(horizons), feedthrough)
+            words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
+            self._sums = _thetahat.NormalEquations(data, words, _past(past))
+            return
+        for name, value in found.items():
+            if value is not None:
+                raise ValueError(f"{name}: it is for state-space models; give an order too, or leave it out")
         if terms is not None or select is not None:
-            others: dict[str, Any] = {"na": na, "nb": nb, "taps": taps, "couple": couple, "constant": constant}
+            others = {"na": na, "nb": nb, "taps": taps, "couple": couple, "constant": constant}
             for name, value in others.items():
                 if value is not None:
                     raise ValueError(f"{name}: it is not of nonlinear models, whose products are named; leave it or the terms out")
@@ -148,7 +174,7 @@ class NormalEquations:
             named = "none" if kernel is None else _options.text("kernel", kernel)
             words = ["--model=fir", *_options.order_words(taps=taps, nk=0 if nk is None else nk), f"--kernel={named}"]
         elif na is None and nb is None:
-            raise ValueError("na: give the orders na and nb, or taps, or terms")
+            raise ValueError("na: give the orders na and nb, or taps, terms or an order")
         elif nb is None:
             if nk is not None:
                 raise ValueError("nk: it is for inputs; give nb too, or leave it out")
@@ -260,6 +286,16 @@ class NormalEquations:
         driven += f", output{'' if len(outputs) == 1 else 's'} {', '.join(outputs)}"
         pieces = f"{self.pieces} piece{'' if self.pieces == 1 else 's'}"
         return f"NormalEquations({self._sums.name()}, {self.rows} rows in {pieces}, {driven})"
+
+
+def both_horizons(horizons: tuple[int | None, int | None] | None) -> tuple[int | None, int | None]:
+    """The past and the future that a subspace method is told."""
+    if horizons is None:
+        return None, None
+    if not isinstance(horizons, (tuple, list)) or len(horizons) != 2:
+        raise TypeError(f"horizons: expected two, the past and the future, found {horizons!r}")
+    past, future = (None if one is None else _options.count("horizons", one) for one in horizons)
+    return past, future
 
 
 def _past(past: int) -> int:

@@ -9,7 +9,7 @@ from thetahat import _options, _said, _thetahat
 from thetahat._fit import EstimationWarning
 from thetahat._log import Log, handle
 from thetahat._model import Model
-from thetahat._options import FitOptions, Rows
+from thetahat._options import FitOptions, Orders, Rows
 
 
 def ss(
@@ -100,14 +100,29 @@ def ss(
     >>> abs(value + 5) < 3 * error
     True
     """
-    words = ["--model=ss", *_options.order_words(order=order, nk=nk)]
-    words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
-    words += [] if past is None else [f"--past={_options.count('past', past)}"]
-    words += [] if future is None else [f"--future={_options.count('future', future)}"]
-    words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
+    words = subspace_words(order, nk, weighting, past, future, feedthrough)
     words += [] if refine is None else [f"--refine={_options.text('refine', refine)}"]
     words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
     found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
     for warning in found._model.warnings():
         _said.warn(warning, EstimationWarning, stacklevel=2)
     return found
+
+
+def subspace_words(
+    order: int | range | str | None,
+    nk: Orders | None,
+    weighting: str | None,
+    past: int | None,
+    future: int | None,
+    feedthrough: bool | None,
+) -> list[str]:
+    """How the states are found, as options; the order "auto" is left to the data, as none is."""
+    if isinstance(order, str) and order != "auto":
+        raise TypeError(f'order: expected an int, a range or "auto", found {order!r}')
+    words = ["--model=ss", *_options.order_words(order=None if isinstance(order, str) else order, nk=nk)]
+    words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
+    words += [] if past is None else [f"--past={_options.count('past', past)}"]
+    words += [] if future is None else [f"--future={_options.count('future', future)}"]
+    words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
+    return words

@@ -39,7 +39,9 @@ from thetahat._grey_box import GreyBox, grey
 from thetahat._log import Log
 from thetahat._model import Model
 from thetahat._normal_equations import NormalEquations as _NormalEquations
+from thetahat._normal_equations import both_horizons
 from thetahat._options import EquationsOptions
+from thetahat._state_space import ss
 
 __all__ = ["fit_experiments", "fit_many", "normal_equations", "rows"]
 
@@ -222,7 +224,7 @@ def fit_experiments(
     logs : iterable, dict of names to logs, str or DataFrame
         The experiments, as for `fit_many`: files, logs, frames, delayed objects; or a data frame of Dask, whose partitions they are. Nothing
         reaches from one into the next.
-    fit : {oe, armax, bj, arma, general, grey, arx, ar, fir}, default oe
+    fit : {oe, armax, bj, arma, general, grey, arx, ar, fir, ss}, default oe
         The function of this package that fits the model to one log. What is linear in its parameters is solved in one pass, by
         `normal_equations`. Logs of a model in equations (`grey`) are fetched too: it is the steps of its filter that take long.
     read : dict, optional
@@ -259,12 +261,18 @@ def fit_experiments(
     >>> bool(abs(model.parameters - whole.parameters).max() < 1e-8)
     True
     """
-    if fit not in (oe, armax, bj, arma, general, grey, arx, ar, fir):
+    if fit not in (oe, armax, bj, arma, general, grey, arx, ar, fir, ss):
         name = getattr(fit, "__name__", fit)
         raise ValueError(f"fit: {name!r} fits no one model to experiments; give thetahat.oe, armax, bj, arma, general or grey")
     bound = inspect.signature(fit).bind(None, **options)
     bound.apply_defaults()
-    if fit in (arx, ar, fir):
+    if fit is ss:
+        order = options.pop("order", None)
+        horizons = options.pop("past", None), options.pop("future", None)
+        options.update(order="auto" if order is None else order, horizons=horizons)
+    if fit in (arx, ar, fir, ss):
+        for name in set(options) - set(inspect.signature(_NormalEquations).parameters):
+            raise ValueError(f"{name}: the model is made in one pass over the experiments, which does not know it; leave it out")
         return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve(), stacklevel=3)
     work = _many.Work(read=dict(read or {}))
     runs = _runs(_pieces(logs), per_task)
@@ -398,9 +406,14 @@ def _lags(
     select: Any = None,
     ny: Any = None,
     nu: Any = None,
+    order: Any = None,
+    weighting: Any = None,
+    horizons: Any = None,
     **_: Any,
 ) -> int:
     """How many rows the model reaches back to, at most. Orders are numbers, ranges, or one of these for each input."""
+    if order is not None:
+        return _largest(nk) + _thetahat.NormalEquations.lags_of_states(weighting, *both_horizons(horizons))
     if terms is not None or select is not None:
         na, nb = 2 if ny is None else ny, 2 if nu is None else nu
     first = (0 if taps is not None else 1) if nk is None else _largest(nk)

@@ -1,8 +1,11 @@
 //! State-space models of any number of outputs by a subspace method.
 
+mod data;
 mod innovations;
+mod joint;
 mod lagged_products;
 mod ordered;
+mod sums;
 #[cfg(test)]
 pub(super) mod tests;
 mod weighting;
@@ -20,9 +23,13 @@ use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable, riccati};
 use crate::optimize::normal;
+pub(super) use data::SubspaceData;
 pub(crate) use innovations::products as products_of_innovations;
+pub(super) use joint::joint_columns;
+pub(crate) use joint::{joint_products, joint_taps};
 pub(super) use lagged_products::{Factor, LaggedProducts, ROUNDING, divided, log_determinant};
 pub(crate) use ordered::{Ordered, with_levels};
+pub(crate) use sums::{SegmentStart, SubspaceErrors, SubspaceSums};
 use weighting::Weighted;
 pub use weighting::Weighting;
 
@@ -45,7 +52,7 @@ const HIGHEST_ORDER: usize = 20;
 /// let options = SubspaceOptions { feedthrough: Some(false), ..SubspaceOptions::default() };
 /// assert_eq!(options.past, None);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct SubspaceOptions {
     /// What the singular values are of. By default SSARX.
     pub weighting: Weighting,
@@ -73,6 +80,8 @@ pub struct Subspace {
     scales: Vec<f64>,
     singular_values: Vec<f64>,
     highest: usize,
+    /// The rows that make x(t) of z(t-1), …, z(t-p), x of the highest order.
+    states: DMatrix<f64>,
     /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order; with a constant those of deviations from the means.
     moments: DMatrix<f64>,
     /// These means.
@@ -179,6 +188,11 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
     if record.outputs.is_empty() {
         return Err(Error::data("the record has no outputs; it needs at least one"));
     }
+    subspace_of(record, options)
+}
+
+/// The same of a record, or of sums over parts of one.
+fn subspace_of(data: &impl SubspaceData, options: &SubspaceOptions) -> Result<Subspace, Error> {
     for (name, horizon) in [("past", options.past), ("future", options.future)] {
         if horizon == Some(0) {
             return Err(Error::argument(
@@ -187,52 +201,48 @@ pub fn subspace(record: &JointRecord<'_>, options: &SubspaceOptions) -> Result<S
             ));
         }
     }
-    let past = options.past.map_or_else(|| longest_past(record), Ok)?;
-    enough(record, past, None)?;
-    let constant = options.constant;
-    let mut regression = LaggedProducts::new(record, past, constant).ok_or_else(|| silent(record, past))?;
+    let past = options.past.map_or_else(|| longest_past(data, LONGEST_PAST), Ok)?;
+    enough(data, past, None)?;
+    let products = |past| LaggedProducts::new(data, past, options.constant).ok_or_else(|| data.silent(past));
+    let mut regression = products(past)?;
     if options.past.is_none() {
         let past = regression.akaike(options.feedthrough != Some(false));
         if past < regression.past {
-            regression = LaggedProducts::new(record, past, constant).ok_or_else(|| silent(record, past))?;
+            regression = products(past)?;
         }
     }
     let future = options.future.unwrap_or(regression.past);
     if options.weighting != Weighting::Ssarx {
-        enough(record, regression.past, Some(future))?;
+        enough(data, regression.past, Some(future))?;
     }
     let driven = regression.inputs > 0;
     let feedthrough = driven && options.feedthrough.unwrap_or_else(|| regression.has_feedthrough());
-    Subspace::new(record, &regression, options.weighting, future, feedthrough)
-}
-
-/// The samples that have so many before them in their segment.
-fn samples(record: &JointRecord<'_>, past: usize) -> usize {
-    record.segments.iter().map(|segment| segment.len().saturating_sub(past)).sum()
+    Subspace::new(data, &regression, options.weighting, future, feedthrough)
 }
 
 /// The signals of a regression with such a past: z(t-1), …, z(t-p), u(t) and y(t).
-fn signals(record: &JointRecord<'_>, past: usize) -> usize {
-    (record.inputs.len() + record.outputs.len()).saturating_mul(past.saturating_add(1))
+fn signals(data: &impl SubspaceData, past: usize) -> usize {
+    let (inputs, outputs) = data.channels();
+    (inputs + outputs).saturating_mul(past.saturating_add(1))
 }
 
-/// The longest past that the data may choose.
+/// The longest past that the data may choose, of so many.
 ///
 /// # Errors
 /// If there are too few samples for any.
-fn longest_past(record: &JointRecord<'_>) -> Result<usize, Error> {
-    let fits = |past: &usize| samples(record, *past) >= SAMPLES_A_LAG * signals(record, *past);
-    if let Some(past) = (1..=LONGEST_PAST).rev().find(fits) {
+fn longest_past(data: &impl SubspaceData, most: usize) -> Result<usize, Error> {
+    let fits = |past: &usize| data.samples(*past) >= SAMPLES_A_LAG * signals(data, *past);
+    if let Some(past) = (1..=most).rev().find(fits) {
         return Ok(past);
     }
-    enough(record, 1, None).map(|()| 1)
+    enough(data, 1, None).map(|()| 1)
 }
 
 /// # Errors
 /// [`Error::Undetermined`] if there are not more samples than lagged signals of a past, and of a future where one is projected on.
-fn enough(record: &JointRecord<'_>, past: usize, future: Option<usize>) -> Result<(), Error> {
+fn enough(data: &impl SubspaceData, past: usize, future: Option<usize>) -> Result<(), Error> {
     let lags = past.saturating_add(future.map_or(0, |future| future - 1));
-    let (samples, signals) = (samples(record, lags), signals(record, lags));
+    let (samples, signals) = (data.samples(lags), signals(data, lags));
     if samples > signals {
         return Ok(());
     }
@@ -249,33 +259,9 @@ fn enough(record: &JointRecord<'_>, past: usize, future: Option<usize>) -> Resul
     ))
 }
 
-/// Which signal has no products.
-pub(super) fn silent(record: &JointRecord<'_>, past: usize) -> Error {
-    let is_silent = |signal: &&[f64]| {
-        let used = record.segments.iter().filter(|segment| segment.len() > past);
-        let largest = used
-            .flat_map(|segment| &signal[segment.start + past..segment.end])
-            .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-        !crate::regression::SAFE_NORMS.contains(&largest)
-    };
-    let found = record.signals().iter().position(is_silent).unwrap_or(0);
-    let inputs = record.inputs.len();
-    let name = if found < inputs {
-        format!("input {}", found + 1)
-    } else {
-        format!("output {}", found - inputs + 1)
-    };
-    Error::undetermined(
-        Vec::new(),
-        format!(
-            "{name} is zero, or too large or too small for its squares; leave it out, or give it in other units"
-        ),
-    )
-}
-
 impl Subspace {
     fn new(
-        record: &JointRecord<'_>,
+        data: &impl SubspaceData,
         regression: &LaggedProducts,
         weighting: Weighting,
         future: usize,
@@ -284,7 +270,7 @@ impl Subspace {
         let LaggedProducts { inputs, outputs, past, .. } = *regression;
         let width = regression.width();
         let future = future.min(weighting.longest_future(past));
-        let Weighted { map, factor } = weighting.weighted(record, regression, future, feedthrough)?;
+        let Weighted { map, factor } = weighting.weighted(data, regression, future, feedthrough)?;
         let weighted = map * &factor;
         let (rows, columns) = weighted.shape();
         let same = faer::Mat::from_fn(rows, columns, |row, column| weighted[(row, column)]);
@@ -322,6 +308,7 @@ impl Subspace {
             scales: regression.scales.clone(),
             singular_values,
             highest,
+            states,
             moments,
             means,
         })
@@ -495,38 +482,72 @@ impl Subspace {
         orders: impl IntoIterator<Item = usize>,
     ) -> Result<Vec<OrderScore>, Error> {
         let (m, l) = (self.inputs, self.outputs);
-        if (record.inputs.len(), record.outputs.len()) != (m, l) {
+        if record.channels() != (m, l) {
             return Err(Error::data(format!(
                 "the record has {} inputs and {} outputs, the model {m} and {l}",
                 record.inputs.len(),
                 record.outputs.len()
             )));
         }
-        let samples_in = |record: &JointRecord<'_>| samples(record, 0) as f64;
-        let all = samples_in(record);
         let thinned = thinned_joint(record);
         let looked_at = thinned.as_ref().unwrap_or(record);
+        self.scored(record.samples(0) as f64, orders, |_, model, levels| {
+            let mut products = innovations::products(model, looked_at, levels)?;
+            for (output, scale) in self.scales[m..].iter().enumerate() {
+                products.row_mut(output).unscale_mut(*scale);
+                products.column_mut(output).unscale_mut(*scale);
+            }
+            Some(products / looked_at.samples(0) as f64)
+        })
+    }
+
+    /// The same with so many samples, where `mean` gives the mean products of the errors of the model of an order with these levels, in units
+    /// of the scales.
+    fn scored(
+        &self,
+        samples: f64,
+        orders: impl IntoIterator<Item = usize>,
+        mean: impl Fn(usize, &StateSpace, &[f64]) -> Option<DMatrix<f64>> + Sync,
+    ) -> Result<Vec<OrderScore>, Error> {
         let score = |order: usize| {
             let model = match self.state_space(order, 1.0) {
                 Ok(model) => model,
                 Err(Error::Undetermined { .. }) => return Ok(OrderScore { order, mdl: None }),
                 Err(error) => return Err(error),
             };
-            let outputs = &self.scales[m..];
-            let levels = self.levels(order);
-            let products = levels.and_then(|levels| innovations::products(&model, looked_at, &levels));
-            let mdl = products.map(|mut products| {
-                for (output, scale) in outputs.iter().enumerate() {
-                    products.row_mut(output).unscale_mut(*scale);
-                    products.column_mut(output).unscale_mut(*scale);
-                }
-                let mean = products / samples_in(looked_at) + DMatrix::identity(l, l) * NOTHING_LEFT;
-                all * log_determinant(&mean) + self.free_parameters(order) as f64 * all.ln()
+            let mean = self.levels(order).and_then(|levels| mean(order, &model, &levels));
+            let mdl = mean.map(|mean| {
+                let mean = mean + DMatrix::identity(self.outputs, self.outputs) * NOTHING_LEFT;
+                samples * log_determinant(&mean) + self.free_parameters(order) as f64 * samples.ln()
             });
             Ok(OrderScore { order, mdl: mdl.filter(|mdl| mdl.is_finite()) })
         };
         let orders: Vec<usize> = orders.into_iter().collect();
         orders.into_par_iter().map(score).collect()
+    }
+
+    /// The rows that make e(t), one step ahead of the model of an order, of z(t), …, z(t-lags), all divided by their scales: its predictor starts
+    /// at the state `past` samples before the last of these. None where there is no model.
+    fn errors_of_lags(&self, order: usize, lags: usize) -> Option<DMatrix<f64>> {
+        let model = self.scaled(order, 1.0)?;
+        let (m, width) = (self.inputs, self.inputs + self.outputs);
+        let mut rows = DMatrix::zeros(self.outputs, width * (lags + 1));
+        rows.columns_mut(0, m).copy_from(&-&model.d);
+        rows.columns_mut(m, self.outputs).fill_with_identity();
+        let moved = &model.f - &model.k * &model.h;
+        let mut driven = DMatrix::zeros(order, width);
+        driven.columns_mut(0, m).copy_from(&(&model.g - &model.k * &model.d));
+        driven.columns_mut(m, self.outputs).copy_from(&model.k);
+        // H (F - K H)^(j-1).
+        let mut seen = model.h;
+        let ran = lags.checked_sub(self.past)?;
+        for lag in 1..=ran {
+            rows.columns_mut(width * lag, width).copy_from(&(-(&seen * &driven)));
+            seen *= &moved;
+        }
+        let start = -(seen * self.states.rows(0, order));
+        rows.columns_mut(width * (ran + 1), start.ncols()).copy_from(&start);
+        Some(rows)
     }
 
     /// k, the free parameters of a canonical form: n (m + 2 l), l m with feedthrough, and l levels.

@@ -13,11 +13,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
-use super::subspace::{Factor, LaggedProducts, ROUNDING, divided, log_determinant};
+use super::subspace::{Factor, LaggedProducts, ROUNDING, SubspaceData, divided, log_determinant};
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{Entry, EntryCovariance, Quantity, StateSpace, StateSpaceMatrix, lag_name};
-pub(crate) use sums::{joint_products, joint_taps, vector_arx_of_sums};
+pub(crate) use sums::vector_arx_of_sums;
 
 /// More models of more coefficients are not compared: these are a minute or two.
 const MOST_WORK: f64 = 2e12;
@@ -193,11 +193,9 @@ pub(crate) fn vector_arx(
     let products = |delay: usize, longest: usize| {
         let later = record.clone().delayed(&vec![delay; record.inputs.len()]);
         let products = LaggedProducts::new(&later, longest, options.constant);
-        products.ok_or_else(|| super::subspace::silent(&later, longest))
+        products.ok_or_else(|| later.silent(longest))
     };
-    let samples =
-        |longest: usize| record.segments.iter().map(|segment| segment.len().saturating_sub(longest)).sum();
-    of_products(products, samples, (record.inputs.len(), record.outputs.len()), options, sample_time)
+    of_products(products, |longest| record.samples(longest), record.channels(), options, sample_time)
 }
 
 /// The same where `products` gives those of so many lags of a record whose inputs are so many samples late, and `samples` how many of them

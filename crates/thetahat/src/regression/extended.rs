@@ -103,6 +103,18 @@ impl ExtendedGram {
         each.map(|(taps, lag)| (products.position(taps.signal, lag) + 1, taps.sign)).collect()
     }
 
+    /// The same sums of the columns of fewer taps, each of which stands at a place of this.
+    pub(crate) fn restricted(&self, taps: &[Taps], places: impl Iterator<Item = usize>) -> Self {
+        let size = Products::new(taps).size() + 1;
+        let mut of_own = vec![0; size];
+        for ((own, _), place) in Self::columns(taps).into_iter().zip(places) {
+            of_own[own] = place;
+        }
+        let entries = (0..size).flat_map(|row| (row..size).map(move |column| (row, column)));
+        let entries = entries.map(|(row, column)| self.entry(of_own[row], of_own[column])).collect();
+        Self { rows: self.rows, size, entries }
+    }
+
     /// Less an offset of each signal: none of the column of ones.
     pub(crate) fn less(&self, taps: &[Taps], offsets: &[f64]) -> Self {
         let of_signals = Products::new(taps);

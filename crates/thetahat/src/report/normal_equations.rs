@@ -4,9 +4,9 @@ mod border;
 mod linear;
 mod nonlinear_arx;
 mod settings;
+mod states;
 #[cfg(test)]
 mod tests;
-mod vector_arx;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -22,7 +22,7 @@ use super::schema::{Data, Missing, Report};
 use super::state_space::StateSpacePlan;
 use super::totals::Totals;
 use crate::data::{Log, Record, Rows, Source, digests};
-use crate::estimate::{joint_products, joint_taps, lagged_products};
+use crate::estimate::{SegmentStart, joint_products, joint_taps, lagged_products};
 use crate::regression::ExtendedGram;
 use crate::respond::InitialCondition;
 use crate::validate::Fit;
@@ -41,7 +41,7 @@ use settings::{Kind, Settings};
 /// and the sums of each channel hold all that a fit by least squares asks of the data: parameters and their covariance, the noise
 /// variance, the offsets that are taken from the channels (means that are known at the end only), whether a constant is worth its
 /// parameter, the fit one step ahead. So ARX and AR models, and impulse responses with a kernel or without, come out as
-/// [`identify`](super::identify()) finds them on the joined log. ARX models with several outputs ([`of_states`](Self::of_states)) and nonlinear ones of
+/// [`identify`](super::identify()) finds them on the joined log. ARX models with several outputs and state-space models ([`of_states`](Self::of_states)), and nonlinear ARX models of
 /// products ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
 ///
 /// Sums are in twice the precision, 32 digits, of which a condition number kappa takes 2 log10(kappa): parameters are exact to
@@ -92,6 +92,9 @@ pub struct NormalEquations {
     /// What these are about, where products are not of two signals alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     centred: Option<Centred>,
+    /// The first samples of segments, of models whose lags the data choose.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    starts: Vec<SegmentStart>,
     /// Of each channel, the inputs first, expressions last.
     channels: Vec<Totals>,
     /// The rows of all pieces, those of the past among them; and which of them are no past.
@@ -143,6 +146,17 @@ impl<'l> Piece<'l> {
         let each = record.segments.iter().zip(&record.past);
         each.map(|(rows, past)| rows.start - lags.min(*past)..rows.end).collect()
     }
+
+    /// The first `lags` samples of segments of which some are its own.
+    fn starts(record: &Record<'_>, signals: &[&[f64]], lags: usize) -> Vec<SegmentStart> {
+        let each = record.segments.iter().zip(&record.past).filter(|(_, past)| **past < lags);
+        each.map(|(rows, past)| {
+            let samples = rows.start - past..rows.end.min(rows.start - past + lags);
+            let signals = signals.iter().map(|signal| signal[samples.clone()].to_vec()).collect();
+            SegmentStart { past: *past, signals }
+        })
+        .collect()
+    }
 }
 
 impl NormalEquations {
@@ -169,15 +183,22 @@ impl NormalEquations {
         Self::made(settings, &piece, (products, None), totals, &record.segments)
     }
 
-    /// Those of an ARX model with several outputs.
+    /// Those of a state-space model, or an ARX model, with several outputs.
     ///
-    /// The plan says the channels, [`arx`](StateSpacePlan::arx), delays, offsets and constant as for
+    /// The plan says the channels, [`arx`](StateSpacePlan::arx) or the options of a subspace method, delays, offsets and constant as for
     /// [`fit_state_space`](super::fit_state_space()). Products of all lags of all signals are the normal equations of every order: orders and
     /// coupling may be ranges, of which the least MDL chooses when the model is solved for. That is done as in a fit to the whole, in 16
     /// digits: to eps kappa^2.
     ///
+    /// The matrices of a subspace method are those of the whole too, the past that the least AIC chooses among them: the first samples of each
+    /// segment are kept, as many as there are lags. What is not the same are its errors: they are those of samples that have its past and
+    /// 10 more before them, and their predictor starts at the states that this past says, where the fit to the whole runs along each segment
+    /// from the state that explains it best. So the noise covariance differs by some errors at the starts of segments, and the order of
+    /// the least MDL may, where two are nearly as good. A search behind it would read the data again.
+    ///
     /// # Errors
-    /// As for [`new`](Self::new); [`Error::Argument`] for a plan without `arx`, and a range of delays, whose models are of other rows.
+    /// As for [`new`](Self::new); [`Error::Argument`] for a search behind a subspace method, and a range of delays of an ARX model, whose
+    /// models are of other rows.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Rows};
@@ -212,8 +233,10 @@ impl NormalEquations {
         past: usize,
     ) -> Result<Self, Error> {
         let settings = Settings::of_states(plan)?;
-        let Kind::VectorArx { outputs, delays, arx } = &settings.kind else {
-            return Err(Error::argument("arx", "the plan is of another model"));
+        let (outputs, delays, lags) = match &settings.kind {
+            Kind::VectorArx { outputs, delays, arx } => (outputs, delays, arx.longest(delays.len())),
+            Kind::Subspace { outputs, delays, subspace, .. } => (outputs, delays, subspace.lags()),
+            _ => return Err(Error::argument("arx", "the plan is of another model")),
         };
         let piece = Piece::new(log, sources, past, settings.lags())?;
         let [first, others @ ..] = outputs.as_slice() else {
@@ -224,11 +247,16 @@ impl NormalEquations {
         let record = log.record(&read, first, &piece.own)?;
         let signals: Vec<&[f64]> =
             std::iter::once(record.output).chain(record.inputs.iter().copied()).collect();
-        let taps = joint_taps(delays, outputs.len(), arx.longest(delays.len()));
+        let taps = joint_taps(delays, outputs.len(), lags);
         let segments = Piece::with_past(&record, settings.lags());
         let products = joint_products(&signals, taps, &segments)?;
         let totals = Self::totals(&settings, &piece, (&record.segments, &record.segments))?;
-        Self::made(settings, &piece, (products, None), totals, &record.segments)
+        let starts = match &settings.kind {
+            Kind::Subspace { .. } => Piece::starts(&record, &signals, settings.lags()),
+            _ => Vec::new(),
+        };
+        let made = Self::made(settings, &piece, (products, None), totals, &record.segments)?;
+        Ok(Self { starts, ..made })
     }
 
     /// Those of a nonlinear ARX model of products with one output: those that are named, [`MapPlan::Products`](super::MapPlan::Products), or
@@ -309,6 +337,7 @@ impl NormalEquations {
             sample_time: log.sample_time(),
             products,
             centred,
+            starts: Vec::new(),
             channels,
             rows: log.rows(),
             segments: segments.iter().map(Rows::from_positions).collect(),
@@ -390,6 +419,7 @@ impl NormalEquations {
         self.time_gaps += other.time_gaps;
         self.logs.extend(logs);
         self.digests.extend(other.digests.iter().cloned());
+        self.starts.extend(other.starts.iter().cloned());
         self.border = border;
         Ok(())
     }
@@ -402,7 +432,10 @@ impl NormalEquations {
     pub fn solve(&self) -> Result<Report, Error> {
         match &self.settings.kind {
             Kind::Linear { orders, kernel, .. } => linear::solve(self, orders, *kernel),
-            Kind::VectorArx { delays, arx, .. } => vector_arx::solve(self, delays, arx),
+            Kind::VectorArx { delays, arx, .. } => states::arx(self, delays, arx),
+            Kind::Subspace { delays, subspace, orders, .. } => {
+                states::subspace(self, delays, subspace, orders.as_ref())
+            }
             Kind::NonlinearArx { .. } => {
                 let centred = self.centred.as_ref().ok_or_else(Self::damaged)?;
                 nonlinear_arx::solve(self, centred)
@@ -511,10 +544,15 @@ impl Document for NormalEquations {
                 Products::of(&self.settings).is_ok_and(of)
             }
             (Kind::NonlinearArx { .. }, None) => false,
-            (Kind::Linear { .. } | Kind::VectorArx { .. }, centred) => centred.is_none(),
+            (_, centred) => centred.is_none(),
+        };
+        let starts = match self.settings.kind {
+            Kind::Subspace { .. } => self.starts.iter().all(|start| start.fits(channels, self.lags())),
+            _ => self.starts.is_empty(),
         };
         let fits = self.settings.fits(self.products.size())
             && centred
+            && starts
             && self.channels.len() == self.settings.all_names().len()
             && self.channels.iter().all(Totals::is_finite)
             && self.sample_time.is_finite()

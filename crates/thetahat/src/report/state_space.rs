@@ -16,8 +16,7 @@ use crate::model::{Model, Quantity, Signal, StateSpaceModel};
 use crate::optimize::{Monitor, Search};
 use crate::regression::{SAFE_NORMS, largest};
 use crate::{Document, Error};
-use estimated::Estimated;
-pub(super) use estimated::of_arx;
+pub(super) use estimated::{Estimated, by_sums, of_arx};
 
 /// Which state-space model to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]
@@ -143,10 +142,12 @@ impl StateSpacePlan {
         Ok(())
     }
 
-    /// How many rows before a row an ARX model reads; none of another one, whose states have no finite past.
+    /// How many rows before a row a model is found from: the lags of an ARX model; or the past of a subspace method, 40 where the data choose
+    /// it, and 10 more or its future, from which its errors come.
     pub fn lags(&self) -> usize {
         let late = self.delays.iter().copied().max().unwrap_or(0);
-        self.arx.as_ref().map_or(0, |arx| late.saturating_add(arx.longest(self.inputs.len())))
+        let lags = self.arx.as_ref().map(|arx| arx.longest(self.inputs.len()));
+        late.saturating_add(lags.unwrap_or_else(|| self.subspace.lags()))
     }
 
     /// Levels that are given are not estimated unless that is asked for.

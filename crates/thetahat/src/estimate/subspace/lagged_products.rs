@@ -4,9 +4,8 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::data::JointRecord;
+use super::data::SubspaceData;
 use crate::optimize::normal;
-use crate::regression::joint_gram;
 
 /// What is left of a variance by rounding in a Gram matrix, as a fraction of it.
 pub(in crate::estimate) const ROUNDING: f64 = 1e-13;
@@ -98,43 +97,8 @@ pub(in crate::estimate) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64
     right
 }
 
-/// The mean products of z(t), …, z(t-longest), lag by lag, the number of samples, and the means if products are to be those of deviations
-/// from them.
-fn mean_products(
-    record: &JointRecord<'_>,
-    longest: usize,
-    centred: bool,
-) -> (DMatrix<f64>, usize, Option<DVector<f64>>) {
-    let signals = record.signals();
-    let (products, samples) = joint_gram(&signals, &record.segments, longest);
-    let mut products = products / samples as f64;
-    let means = centred.then(|| {
-        let used = || record.segments.iter().filter(|segment| segment.len() > longest);
-        let mut means = DVector::zeros(signals.len() * (longest + 1));
-        for (place, signal) in signals.iter().enumerate() {
-            let rows = used().flat_map(|segment| &signal[segment.start + longest..segment.end]);
-            let mut total = crate::regression::sum(rows.copied());
-            for lag in 0..=longest {
-                means[lag * signals.len() + place] = total / samples as f64;
-                // One sample later the rows begin and end one earlier.
-                if lag < longest {
-                    let moved = used().map(|segment| {
-                        signal[segment.start + longest - lag - 1] - signal[segment.end - lag - 1]
-                    });
-                    total += moved.sum::<f64>();
-                }
-            }
-        }
-        means
-    });
-    if let Some(means) = &means {
-        products.ger(-1.0, means, means, 1.0);
-    }
-    (products, samples, means)
-}
-
 /// Products of signals that are divided by their scales.
-fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
+pub(super) fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
     for column in 0..products.ncols() {
         for row in 0..products.nrows() {
             products[(row, column)] /= scales[row % scales.len()] * scales[column % scales.len()];
@@ -145,9 +109,8 @@ fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
 
 impl LaggedProducts {
     /// None where a signal is zero at all of these samples, or its squares leave the range of numbers.
-    pub(in crate::estimate) fn new(record: &JointRecord<'_>, past: usize, constant: bool) -> Option<Self> {
-        let (products, samples, means) = mean_products(record, past, constant);
-        Self::scaled((record.inputs.len(), record.outputs.len()), past, samples, (products, means))
+    pub(in crate::estimate) fn new(data: &impl SubspaceData, past: usize, constant: bool) -> Option<Self> {
+        Self::scaled(data.channels(), past, data.samples(past), data.mean_products(past, constant))
     }
 
     /// The same of the mean products of so many inputs and outputs, and their means where these were taken off.
@@ -170,9 +133,9 @@ impl LaggedProducts {
         Some(Self { inputs, outputs, past, samples, products, means, scales })
     }
 
-    /// The products of more lags of the same record, with the same scales.
-    pub(super) fn longer(&self, record: &JointRecord<'_>, longest: usize) -> DMatrix<f64> {
-        rescaled(mean_products(record, longest, self.means.is_some()).0, &self.scales)
+    /// The products of more lags of the same data, with the same scales.
+    pub(super) fn longer(&self, data: &impl SubspaceData, longest: usize) -> DMatrix<f64> {
+        rescaled(data.mean_products(longest, self.means.is_some()).0, &self.scales)
     }
 
     pub(in crate::estimate) fn width(&self) -> usize {

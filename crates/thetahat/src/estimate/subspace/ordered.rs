@@ -1,13 +1,13 @@
-//! The states of a record, with an order and levels that were given or that the least MDL chooses.
+//! The states of data, with an order and levels that were given or that the least MDL chooses.
 
 use std::ops::RangeInclusive;
 
-use super::{OrderScore, Subspace, SubspaceOptions, best, subspace};
+use super::data::SubspaceData;
+use super::{OrderScore, Subspace, SubspaceOptions, best, subspace_of};
 use crate::Error;
-use crate::data::JointRecord;
 use crate::estimate::Constant;
 
-/// The states of a record, and the order that was given or chosen.
+/// The states of a record or of sums, and the order that was given or chosen.
 #[derive(Debug, Clone)]
 pub(crate) struct Ordered {
     pub(crate) subspace: Subspace,
@@ -22,9 +22,9 @@ impl Ordered {
     /// The order of least MDL among some, or among those that are offered; with levels where these are asked for, or lower MDL.
     ///
     /// # Errors
-    /// As for [`subspace`] and [`Subspace::order`].
+    /// As for [`subspace`](super::subspace) and [`Subspace::order`].
     pub(crate) fn new(
-        record: &JointRecord<'_>,
+        data: &impl SubspaceData,
         options: &SubspaceOptions,
         orders: Option<&RangeInclusive<usize>>,
         constant: Constant,
@@ -32,19 +32,19 @@ impl Ordered {
         let compared = constant == Constant::Auto;
         with_levels(
             constant,
-            |constant| Self::of(record, &SubspaceOptions { constant, ..*options }, orders, compared),
+            |constant| Self::of(data, &SubspaceOptions { constant, ..*options }, orders, compared),
             |found| found.mdl,
         )
     }
 
     /// `compared` says whether its MDL is asked for where the order is given.
     fn of(
-        record: &JointRecord<'_>,
+        data: &impl SubspaceData,
         options: &SubspaceOptions,
         orders: Option<&RangeInclusive<usize>>,
         compared: bool,
     ) -> Result<Self, Error> {
-        let subspace = subspace(record, options)?;
+        let subspace = subspace_of(data, options)?;
         let highest = subspace.highest_order();
         let asked = orders.cloned().unwrap_or_else(|| subspace.orders());
         let orders = *asked.start()..=(*asked.end()).min(highest);
@@ -58,7 +58,7 @@ impl Ordered {
         if given && !compared {
             return Ok(Self { subspace, order: *asked.start(), scores: Vec::new(), mdl: f64::INFINITY });
         }
-        let scores = subspace.scores(record, orders)?;
+        let scores = data.scores(&subspace, orders)?;
         let order = if given { *asked.start() } else { best(&scores)? };
         let own = scores.iter().find(|score| score.order == order).and_then(|score| score.mdl);
         let mdl = own.unwrap_or(f64::INFINITY);

@@ -10,9 +10,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
 
+use super::data::SubspaceData;
 use super::lagged_products::{Factor, LaggedProducts, ROUNDING, divided};
 use crate::Error;
-use crate::data::JointRecord;
 
 /// What a subspace method takes the singular values of.
 ///
@@ -104,7 +104,7 @@ impl Weighting {
     /// [`Error::Undetermined`] where the outputs depend on one another.
     pub(super) fn weighted(
         self,
-        record: &JointRecord<'_>,
+        data: &impl SubspaceData,
         regression: &LaggedProducts,
         future: usize,
         feedthrough: bool,
@@ -113,7 +113,7 @@ impl Weighting {
             Self::Ssarx => Weighted::shifted(regression, future, feedthrough),
             Self::Moesp | Self::N4sid => {
                 let Projected { mut map, products, factor, past, .. } =
-                    Projected::new(record, regression, future);
+                    Projected::new(data, regression, future);
                 let scales = regression.scales[regression.inputs..].iter().cycle();
                 map.row_iter_mut().zip(scales).for_each(|(mut row, scale)| row *= *scale);
                 let factor = if self == Self::Moesp {
@@ -125,8 +125,7 @@ impl Weighting {
                 Some(Weighted { map, factor })
             }
             Self::Cva => {
-                let Projected { mut map, factor, covariance, .. } =
-                    Projected::new(record, regression, future);
+                let Projected { mut map, factor, covariance, .. } = Projected::new(data, regression, future);
                 // Outputs without noise have a singular covariance; what rounding leaves of it must not look like correlation.
                 let rounding = DMatrix::identity(map.nrows(), map.nrows()) * ROUNDING;
                 let left = Cholesky::new(covariance + rounding);
@@ -199,10 +198,10 @@ struct Projected {
 }
 
 impl Projected {
-    fn new(record: &JointRecord<'_>, regression: &LaggedProducts, future: usize) -> Self {
+    fn new(data: &impl SubspaceData, regression: &LaggedProducts, future: usize) -> Self {
         let LaggedProducts { inputs, past, .. } = *regression;
         let width = regression.width();
-        let products = regression.longer(record, past + future - 1);
+        let products = regression.longer(data, past + future - 1);
         // The latest sample of the future has lag 0.
         let coming = |first: usize, last: usize| {
             (0..future).rev().flat_map(move |lag| width * lag + first..width * lag + last)

@@ -1,6 +1,7 @@
 //! What all pieces of a model have in common.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,7 +12,9 @@ use super::Plan;
 use super::nonlinear_arx::Products;
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
-use crate::estimate::{Constant, Initial, Kernel, Method, VectorArxInputs, VectorArxOptions};
+use crate::estimate::{
+    Constant, Initial, Kernel, Method, SubspaceOptions, VectorArxInputs, VectorArxOptions,
+};
 use crate::model::Orders;
 use crate::respond::Horizon;
 use crate::select::{Choice, Select};
@@ -45,6 +48,14 @@ pub(super) enum Kind {
     },
     /// Of polynomials with matrices for coefficients.
     VectorArx { outputs: Vec<String>, delays: Vec<usize>, arx: VectorArxOptions },
+    /// Of the states that a subspace method finds.
+    Subspace {
+        outputs: Vec<String>,
+        delays: Vec<usize>,
+        subspace: SubspaceOptions,
+        /// Those among which the least MDL chooses, if that is said.
+        orders: Option<RangeInclusive<usize>>,
+    },
     /// Of products of regressors.
     NonlinearArx {
         outputs: Vec<String>,
@@ -120,35 +131,46 @@ impl Settings {
         })
     }
 
-    /// Of an ARX model with several outputs.
+    /// Of a model with several outputs.
     pub(super) fn of_states(plan: &StateSpacePlan) -> Result<Self, Error> {
         plan.check()?;
-        let Some(arx) = &plan.arx else {
-            return Err(Error::argument(
-                "arx",
-                "the states of a subspace method are evaluated on the log itself, a second time; from pieces of a log come ARX models",
-            ));
-        };
         check_rows(&plan.estimate, &plan.validate, plan.split)?;
         check_detrend(plan.detrend)?;
-        if arx.delay != (0..=0) {
-            return Err(Error::argument(
+        refuse([
+            (
+                plan.refine.is_some(),
+                "refine",
+                "a search reads the log again and again; leave it out, and search on a part of the log",
+            ),
+            (
+                plan.arx.as_ref().is_some_and(|arx| arx.delay != (0..=0)),
                 "nk",
                 "the rows of a model change with its delay, and the log is not read again; give one number for each input",
-            ));
-        }
+            ),
+        ])?;
+        let outputs = plan.outputs.clone();
         let delays = if plan.delays.is_empty() { vec![0; plan.inputs.len()] } else { plan.delays.clone() };
-        let arx = VectorArxOptions { constant: false, ..arx.clone() };
+        let kind = match &plan.arx {
+            Some(arx) => {
+                let arx = VectorArxOptions { constant: false, ..arx.clone() };
+                Kind::VectorArx { outputs, delays, arx }
+            }
+            None => {
+                let subspace = SubspaceOptions { constant: false, ..plan.subspace };
+                Kind::Subspace { outputs, delays, subspace, orders: plan.orders.clone() }
+            }
+        };
         let settings = Self {
             inputs: plan.inputs.clone(),
-            kind: Kind::VectorArx { outputs: plan.outputs.clone(), delays, arx },
+            kind,
             detrend: plan.detrend.to_string(),
             offsets: plan.offsets.clone(),
             constant: plan.resolved_constant(),
         };
         if settings.lags() > MOST_LAGS {
+            let argument = if plan.arx.is_some() { "na" } else { "past" };
             return Err(Error::argument(
-                "na",
+                argument,
                 format!("lags above {MOST_LAGS} are not read; give lower orders"),
             ));
         }
@@ -260,6 +282,10 @@ impl Settings {
                 let late = delays.iter().copied().max().unwrap_or(0);
                 late.saturating_add(arx.longest(self.inputs.len()))
             }
+            Kind::Subspace { delays, subspace, .. } => {
+                let late = delays.iter().copied().max().unwrap_or(0);
+                late.saturating_add(subspace.lags())
+            }
             Kind::NonlinearArx { .. } => self.nonlinear_plan().map_or(0, |plan| plan.lags()),
         }
     }
@@ -267,7 +293,9 @@ impl Settings {
     pub(super) fn outputs(&self) -> &[String] {
         match &self.kind {
             Kind::Linear { output, .. } => std::slice::from_ref(output),
-            Kind::VectorArx { outputs, .. } | Kind::NonlinearArx { outputs, .. } => outputs,
+            Kind::VectorArx { outputs, .. }
+            | Kind::Subspace { outputs, .. }
+            | Kind::NonlinearArx { outputs, .. } => outputs,
         }
     }
 
@@ -280,7 +308,7 @@ impl Settings {
     pub(super) fn all_names(&self) -> Vec<&str> {
         let expressions = match &self.kind {
             Kind::NonlinearArx { expressions, .. } => expressions.as_slice(),
-            Kind::Linear { .. } | Kind::VectorArx { .. } => &[],
+            _ => &[],
         };
         self.names().into_iter().chain(expressions.iter().map(String::as_str)).collect()
     }
@@ -335,6 +363,15 @@ impl Settings {
                     && self.lags() <= MOST_LAGS
                     && columns == size as u128
             }
+            Kind::Subspace { outputs, delays, subspace, orders } => {
+                let signals = inputs + outputs.len();
+                let columns = (subspace.lags() as u128 + 1) * signals as u128 + 1;
+                !outputs.is_empty()
+                    && delays.len() == inputs
+                    && orders.as_ref().is_none_or(|orders| *orders.start() > 0 && !orders.is_empty())
+                    && self.lags() <= MOST_LAGS
+                    && columns == size as u128
+            }
             Kind::NonlinearArx { outputs, .. } => {
                 outputs.len() == 1 && Products::of(self).is_ok_and(|products| products.columns() == size)
             }
@@ -366,6 +403,19 @@ impl fmt::Display for Kind {
                 let nk = each(&mut delays.iter().map(|delay| delay + first));
                 let inputs = if delays.is_empty() { String::new() } else { format!(", {nb}, {nk}") };
                 write!(formatter, "ARX({}{inputs}) with {} outputs", range(&arx.na), outputs.len())
+            }
+            Self::Subspace { outputs, orders, .. } => {
+                let order = match orders {
+                    Some(orders) if orders.start() == orders.end() => format!(" of order {}", orders.start()),
+                    Some(orders) => format!(" of order {}..{}", orders.start(), orders.end()),
+                    None => String::new(),
+                };
+                let outputs = outputs.len();
+                write!(
+                    formatter,
+                    "state space{order} with {outputs} output{}",
+                    if outputs == 1 { "" } else { "s" }
+                )
             }
             Self::NonlinearArx { chosen: Some(ChosenProducts { degree, .. }), .. } => {
                 write!(formatter, "NARX polynomial of degree {degree}")

@@ -1,6 +1,7 @@
 //! One model from pieces is that of the whole log.
 
 mod nonlinear_arx;
+mod subspace;
 mod vector_arx;
 
 use super::*;

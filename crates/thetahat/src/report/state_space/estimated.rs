@@ -1,4 +1,4 @@
-//! Matrices from a record: by a subspace method, with a search behind it, or as an ARX model.
+//! Matrices from a record, or from sums over parts of one: by a subspace method, with a search behind it, or as an ARX model.
 
 use std::ops::RangeInclusive;
 
@@ -8,9 +8,9 @@ use super::StateSpacePlan;
 use crate::Error;
 use crate::data::{JointRecord, Log};
 use crate::estimate::{
-    Constant, Ordered, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace, SubspaceOptions,
-    SubspaceOutcome, VectorArxEstimate, VectorArxOptions, Weighting, products_of_innovations, refined,
-    subspace, vector_arx, with_levels,
+    Constant, Ordered, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace, SubspaceErrors,
+    SubspaceOptions, SubspaceOutcome, SubspaceSums, VectorArxEstimate, VectorArxOptions, Weighting,
+    products_of_innovations, refined, subspace, vector_arx, with_levels,
 };
 use crate::model::{EntryCovariance, StateSpace};
 use crate::optimize::Monitor;
@@ -80,8 +80,8 @@ pub(super) fn by_arx(
     let exact = |found: &VectorArxEstimate| {
         // What lagged products cannot tell from nothing.
         let record = record.clone().delayed(&vec![found.delay; delays.len()]);
-        let products = products_of_innovations(&found.space, &record, &found.levels)
-            .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+        let products =
+            products_of_innovations(&found.space, &record, &found.levels).ok_or_else(out_of_range)?;
         let all = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
         Ok(products / all as f64)
     };
@@ -128,35 +128,76 @@ pub(super) fn by_subspace(
     constant: Constant,
     (log, monitor): (&Log, Monitor<'_>),
 ) -> Result<Estimated, Error> {
-    let Ordered { subspace: found, order, scores, .. } =
-        Ordered::new(record, &plan.subspace, plan.orders.as_ref(), constant)?;
-    let mut levels = found.levels(order).ok_or_else(integrates)?;
-    let mut matrices = found.state_space(order, log.sample_time())?;
+    let found = Ordered::new(record, &plan.subspace, plan.orders.as_ref(), constant)?;
+    let (order, subspace) = (found.order, &found.subspace);
+    let mut levels = subspace.levels(order).ok_or_else(integrates)?;
+    let mut matrices = subspace.state_space(order, log.sample_time())?;
     let samples = record.segments.iter().map(std::ops::Range::len).sum::<usize>();
-    let free = found.free_parameters(order);
     let outputs = record.outputs.len();
     // Each segment has errors from a state of its own, which is found with them.
     let starts = record.segments.iter().map(|segment| order.min(segment.len() * outputs)).sum::<usize>();
-    let degrees = degrees(&format!("a model of order {order}"), free + starts, samples, outputs)?;
+    let degrees = degrees_of_order(&found, starts, (samples, outputs))?;
     let (mut covariance, mut refinement) = (None, None);
     if let Some(refine) = plan.refine {
-        let start = RefinementStart { name: found.weighting().to_string(), model: matrices, levels };
+        let start = RefinementStart { name: subspace.weighting().to_string(), model: matrices, levels };
         let starts: Vec<RefinementStart> =
-            std::iter::once(start).chain(other_start(record, &found, order, log)).collect();
+            std::iter::once(start).chain(other_start(record, subspace, order, log)).collect();
         let what = Refinement {
             refine,
-            feedthrough: found.feedthrough(),
-            constant: found.has_constant(),
+            feedthrough: subspace.feedthrough(),
+            constant: subspace.has_constant(),
             degrees_of_freedom: degrees,
         };
         let found = refined(record, &starts, what, &plan.search, monitor)?;
         refinement = Some(RefinementOutcome { errors: refine, search: found.search });
         (matrices, levels, covariance) = (found.model, found.levels, found.covariance);
     }
-    let products = products_of_innovations(&matrices, record, &levels)
-        .ok_or_else(|| Error::data("the errors one step ahead leave the range of numbers"))?;
+    let products = products_of_innovations(&matrices, record, &levels).ok_or_else(out_of_range)?;
     let mean = products / samples as f64;
-    Ok(Estimated {
+    let searched = (covariance, refinement);
+    Ok(of_order(found, &plan.subspace, (matrices, levels), searched, (samples, degrees, mean)))
+}
+
+/// The states that sums over parts of a record tell of, and the norm of each output about its mean over the samples that have errors.
+pub(in crate::report) fn by_sums(
+    sums: &SubspaceSums<'_>,
+    (options, orders): (&SubspaceOptions, Option<&RangeInclusive<usize>>),
+    constant: Constant,
+    sample_time: f64,
+) -> Result<(Estimated, Vec<f64>), Error> {
+    let found = Ordered::new(sums, options, orders, constant)?;
+    let levels = found.subspace.levels(found.order).ok_or_else(integrates)?;
+    let matrices = found.subspace.state_space(found.order, sample_time)?;
+    let errors = sums.errors(&found.subspace, found.order).ok_or_else(out_of_range)?;
+    let SubspaceErrors { mean, samples, spreads } = errors;
+    let degrees = degrees_of_order(&found, 0, (samples, mean.nrows()))?;
+    let found = of_order(found, options, (matrices, levels), (None, None), (samples, degrees, mean));
+    Ok((found, spreads))
+}
+
+fn out_of_range() -> Error {
+    Error::data("the errors one step ahead leave the range of numbers")
+}
+
+/// Those of so many samples and outputs, with so many states at which errors start.
+fn degrees_of_order(
+    Ordered { subspace, order, .. }: &Ordered,
+    starts: usize,
+    (samples, outputs): (usize, usize),
+) -> Result<usize, Error> {
+    let free = subspace.free_parameters(*order) + starts;
+    degrees(&format!("a model of order {order}"), free, samples, outputs)
+}
+
+/// The model of an order with these matrices and levels, whose errors have this mean over so many samples, with so many degrees of freedom.
+fn of_order(
+    Ordered { subspace: found, order, scores, .. }: Ordered,
+    options: &SubspaceOptions,
+    (matrices, levels): (StateSpace, Vec<f64>),
+    (covariance, refinement): (Option<EntryCovariance>, Option<RefinementOutcome>),
+    (samples, degrees, mean): (usize, usize, DMatrix<f64>),
+) -> Estimated {
+    Estimated {
         matrices: with_noise(matrices, &mean, samples, degrees),
         levels,
         has_levels: found.has_constant(),
@@ -166,19 +207,19 @@ pub(super) fn by_subspace(
             past: found.past(),
             future: found.future(),
             feedthrough: found.feedthrough(),
-            feedthrough_given: plan.subspace.feedthrough.is_some(),
+            feedthrough_given: options.feedthrough.is_some(),
             constant: found.has_constant(),
             singular_values: found.singular_values().iter().copied().take(MOST_VALUES).collect(),
             orders: scores,
             refinement,
         }),
-        free,
+        free: found.free_parameters(order),
         degrees,
         samples,
         mean,
         delay: 0,
         offered: found.orders(),
-    })
+    }
 }
 
 /// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has no such model.

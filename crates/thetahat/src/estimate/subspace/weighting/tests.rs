@@ -3,6 +3,7 @@ use std::io::Write;
 use super::super::tests::{Run, distance, plant};
 use super::super::{Subspace, SubspaceOptions, subspace};
 use super::*;
+use crate::data::JointRecord;
 use crate::model::StateSpace;
 
 const CLASSICAL: [Weighting; 3] = [Weighting::Moesp, Weighting::N4sid, Weighting::Cva];

@@ -81,9 +81,10 @@ pub(crate) struct FitArguments {
     /// What to print: a table for people, or the JSON report
     #[arg(long, value_enum, default_value = "table", help_heading = "Output", conflicts_with = "each")]
     pub(crate) format: FormatArgument,
-    /// Read the logs once, part by part, in memory that does not grow with their rows, for an ARX or AR model of given orders or an
-    /// impulse response: the same parameters. With several outputs the orders may be ranges. Of
-    /// nonlinear ARX models those of products (--narx poly with --term, --terms or --select mdl) The figures that need the log again, of free runs and of held-out rows, are left out
+    /// Read the logs once, part by part, in memory that does not grow with their rows: the same parameters, of an ARX or AR model of given
+    /// orders, an impulse response, a state-space model without --refine, or a nonlinear ARX model of products (--narx poly with --term,
+    /// --terms or --select mdl). With several outputs orders may be ranges. Figures that need the log again, of free runs and of
+    /// held-out rows, are left out
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "grey", "from", "continuous", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]

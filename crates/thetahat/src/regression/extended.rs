@@ -213,6 +213,35 @@ impl ExtendedGram {
         (products, centred.then(|| DVector::from_fn(size, |row, _| mean(columns[row]))))
     }
 
+    /// The means of the products of combinations of some columns, C S C' / N, if `centred` of their deviations from their means. In all digits:
+    /// what combinations leave of the columns may be much smaller than these. O(p^2) for each combination of p columns.
+    pub(crate) fn mean_products_of(
+        &self,
+        columns: &[Column],
+        combinations: &DMatrix<f64>,
+        centred: bool,
+    ) -> DMatrix<f64> {
+        let entry = |one: usize, other: usize| {
+            if centred { self.about_means(one, other) } else { self.entry(one, other) }
+        };
+        let weighted = |combination: usize, value: &dyn Fn(usize) -> fx128| {
+            let each = (0..columns.len()).map(|k| (k, columns[k].1 * combinations[(combination, k)]));
+            each.fold(fx128::ZERO, |sum, (k, factor)| sum.add_accurate(value(k) * fx128::from_f64(factor)))
+        };
+        let count = combinations.nrows();
+        // C S.
+        let through = |combination: usize| -> Vec<fx128> {
+            let places = columns.iter().map(|(place, _)| *place);
+            places.map(|place| weighted(combination, &|k| entry(place, columns[k].0))).collect()
+        };
+        let through: Vec<Vec<fx128>> = (0..count).map(through).collect();
+        let rows = fx128::from_f64(self.rows as f64);
+        DMatrix::from_fn(count, count, |row, column| {
+            let (row, column) = (row.min(column), row.max(column));
+            (weighted(row, &|k| through[column][k]) / rows).0
+        })
+    }
+
     /// The regression of a target on some columns: Cholesky, R' R = G, with the target last.
     ///
     /// # Errors

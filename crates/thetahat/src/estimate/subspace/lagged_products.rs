@@ -98,7 +98,7 @@ pub(in crate::estimate) fn divided(mut right: DMatrix<f64>, factor: &DMatrix<f64
 }
 
 /// Products of signals that are divided by their scales.
-pub(super) fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
+fn rescaled(mut products: DMatrix<f64>, scales: &[f64]) -> DMatrix<f64> {
     for column in 0..products.ncols() {
         for row in 0..products.nrows() {
             products[(row, column)] /= scales[row % scales.len()] * scales[column % scales.len()];

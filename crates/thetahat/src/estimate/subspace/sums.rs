@@ -8,13 +8,15 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::data::SubspaceData;
 use super::joint::{joint_columns, joint_taps};
-use super::lagged_products::rescaled;
 use super::{LONGEST_PAST, OrderScore, Subspace, SubspaceOptions, Weighting, longest_past};
 use crate::Error;
 use crate::regression::{ExtendedGram, Lagged, Presample};
 
 /// The samples that a predictor runs over before its errors count.
 const RUN: usize = 10;
+
+/// The variance of errors, in squares of the scales, that sums in 32 digits do not tell from none.
+const UNSEEN: f64 = 1e-26;
 
 impl SubspaceOptions {
     /// How many lags of all signals a model and its errors are found from.
@@ -136,11 +138,13 @@ impl SubspaceSums<'_> {
         order: usize,
         lags: usize,
     ) -> Option<DMatrix<f64>> {
-        let combination = found.errors_of_lags(order, lags)?;
+        let mut combination = found.errors_of_lags(order, lags)?;
+        for (place, mut column) in combination.column_iter_mut().enumerate() {
+            column.unscale_mut(found.scales[place % found.scales.len()]);
+        }
         let columns = joint_columns(&joint_taps(self.delays, self.outputs(), lags), self.outputs());
-        let products = rescaled(products.mean_products(&columns, found.has_constant()).0, &found.scales);
-        let mut mean = &combination * products * combination.transpose();
-        mean.fill_lower_triangle_with_upper_triangle();
+        let mean = products.mean_products_of(&columns, &combination, found.has_constant())
+            + DMatrix::identity(self.outputs(), self.outputs()) * UNSEEN;
         mean.iter().all(|value| value.is_finite()).then_some(mean)
     }
 }

@@ -183,3 +183,28 @@ fn what_makes_no_piece_or_does_not_fit_together_is_refused() {
     let error = unsolved(&Log::new(channels, 0.5).unwrap(), &plan());
     assert!(error.contains("range of numbers"), "{error}");
 }
+
+#[test]
+fn outputs_without_noise_have_none() {
+    let rows = 2000;
+    let u = noise(rows, 1);
+    let (mut y, mut z) = (vec![0.0; rows], vec![0.0; rows]);
+    for t in 1..rows {
+        y[t] = 0.9 * y[t - 1] + u[t - 1];
+        z[t] = 0.5 * z[t - 1] - 0.5 * y[t - 1];
+    }
+    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let log = Log::new(vec![channel("u", u), channel("y", y), channel("z", z)], 1.0).unwrap();
+    for detrend in [Detrend::Mean, Detrend::None] {
+        let plan = StateSpacePlan { detrend, ..StateSpacePlan::new(&["u"], &["y", "z"]) };
+        let found = merged(&pieces(&log, &plan, &[0, 700, rows])).solve().unwrap();
+        assert!(found.estimation.mse < 1e-20 && found.to_json().is_ok(), "{:e}", found.estimation.mse);
+        let mut poles: Vec<f64> =
+            space(&found).matrices().f.complex_eigenvalues().iter().map(|p| p.re).collect();
+        poles.sort_by(f64::total_cmp);
+        assert!(
+            poles.len() == 2 && (poles[0] - 0.5).abs() < 1e-6 && (poles[1] - 0.9).abs() < 1e-6,
+            "{poles:?}"
+        );
+    }
+}

@@ -233,7 +233,7 @@ def test_states_that_cannot_be_found_are_refused(log: th.Log, two: th.Log) -> No
         with pytest.raises(kind, match=message):
             th.NormalEquations(two, **arguments)
     with pytest.raises(th.EstimationError, match="lagged signals"):
-        th.NormalEquations(log[:9], order=2).solve()
+        th.NormalEquations(log[:6], order=1).solve()
 
 
 def test_several_outputs_without_inputs(two: th.Log) -> None:

@@ -37,12 +37,19 @@ impl Numbers {
         numbers
     }
 
+    /// Whether numbers have a decimal point and none of them stands for a missing value.
+    pub(super) fn are_plain(&self) -> bool {
+        !self.decimal_comma && self.missing_numbers.is_empty()
+    }
+
     /// Reads the number at the front of a text and returns its length; nothing if that takes a closer look.
     pub(super) fn prefix(&self, text: &[u8]) -> Option<(f64, usize)> {
         if self.decimal_comma {
             return None;
         }
-        let (value, length) = match decimal::short(text) {
+        let short =
+            decimal::short(text).filter(|(_, length)| !matches!(text.get(*length), Some(b'e' | b'E')));
+        let (value, length) = match short {
             Some(short) => short,
             None => fast_float2::parse_partial::<f64, _>(text).ok()?,
         };
@@ -233,6 +240,10 @@ mod tests {
         let numbers = Numbers::new(false, &[]);
         assert_eq!(numbers.prefix(b"1.5,2"), Some((1.5, 3)));
         assert_eq!(numbers.prefix(b"1e\n"), Some((1.0, 1)));
+        for text in ["1e5,", "-1.5E5,", "1.2345678e5,"] {
+            let expected = text[..text.len() - 1].parse::<f64>().map(|value| (value, text.len() - 1)).ok();
+            assert_eq!(numbers.prefix(format!("{text}        ").as_bytes()), expected, "{text}");
+        }
         for text in ["nan,", "inf,", "1e400,", ",", "", "abc", " 1"] {
             assert_eq!(numbers.prefix(text.as_bytes()), None, "{text}");
         }

@@ -12,6 +12,7 @@
 use memchr::{memchr, memchr_iter, memchr3};
 use rayon::prelude::*;
 
+use super::decimal;
 use super::error::Error;
 use super::layout::{Layout, Row};
 use super::lines::Lines;
@@ -178,16 +179,14 @@ impl Plan {
     /// Reads rows up to the first that needs care.
     fn read_fast(&self, piece: Piece<'_>) -> Read {
         let Piece { text, mut columns } = piece;
-        let mut values = vec![0.0; self.fields.len()];
         let mut read = Read::default();
         while read.length < text.len() {
             let rest = &text[read.length..];
             if let Some(length) = self.layout.dialect.skipped_line(rest) {
                 read.length += length;
-            } else if let Some(length) = self.row(rest, &mut values) {
-                for (column, &value) in columns.iter_mut().zip(&values) {
-                    column[read.rows] = value;
-                }
+            } else if let Some(length) =
+                self.row(rest, columns.iter_mut().filter_map(|column| column.get_mut(read.rows)))
+            {
                 read.lines.push(read.rows, read.line);
                 read.rows += 1;
                 read.length += length;
@@ -199,13 +198,17 @@ impl Plan {
         read
     }
 
-    /// Reads the row at the front of a text and returns its length, unless it needs care.
-    pub(super) fn row(&self, text: &[u8], values: &mut [f64]) -> Option<usize> {
+    /// Reads the row at the front of a text into `values`, one for each field, and returns its length, unless it needs care.
+    pub(super) fn row<'v>(&self, text: &[u8], values: impl Iterator<Item = &'v mut f64>) -> Option<usize> {
         let (mut taken, mut field) = (0, 0);
-        for (value, &wanted) in values.iter_mut().zip(&self.fields) {
+        for (value, &wanted) in values.zip(&self.fields) {
             taken += self.skip(text.get(taken..)?, field, wanted)?;
+            let rest = text.get(taken..)?;
             let length;
-            (*value, length) = self.value(text.get(taken..)?, wanted)?;
+            (*value, length) = match self.number(rest, wanted) {
+                Some(found) => found,
+                None => self.value(rest, wanted)?,
+            };
             taken += length;
             field = wanted + 1;
         }
@@ -232,14 +235,31 @@ impl Plan {
         if index + 1 == self.layout.width() { b'\n' } else { self.layout.dialect.delimiter }
     }
 
-    /// Reads the value at the front of a text, and returns it with the length of its field.
+    /// Reads the value at the front of a text, and returns it with the length of its field: most are short numbers and nothing
+    /// else, whose end need not be searched for.
+    #[inline]
+    fn number(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
+        if self.numbers.are_plain() && self.has_numbers(index) {
+            let (value, length) = decimal::short(text)?;
+            return (text.get(length) == Some(&self.end_of(index))).then_some((value, length + 1));
+        }
+        None
+    }
+
+    /// Whether what is in a field is meant as a number.
+    fn has_numbers(&self, index: usize) -> bool {
+        self.time != Some(index) || matches!(self.clock, Clock::Seconds)
+    }
+
+    /// The same of any value.
+    #[inline(never)]
     fn value(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
         let dialect = self.layout.dialect;
         let blanks = |text: &[u8]| text.iter().take_while(|&&byte| dialect.is_blank(byte)).count();
         let is_time = self.time == Some(index);
         let start = blanks(text);
-        // Most fields are plain numbers, whose end need not be searched for: it is where the number ends.
-        if (!is_time || matches!(self.clock, Clock::Seconds))
+        // The end of a number need not be searched for either: it is where the number ends.
+        if self.has_numbers(index)
             && let Some((value, length)) = self.numbers.prefix(&text[start..])
         {
             let end = start + length;

@@ -160,7 +160,7 @@ impl TextStream {
         }
         let rest = &self.text[self.position..];
         let mut event = Event::Row;
-        let length = match self.plan.row(rest, &mut self.fields) {
+        let length = match self.plan.row(rest, self.fields.iter_mut()) {
             Some(length) => length,
             None => {
                 let Some(newline) = memchr(b'\n', rest) else {

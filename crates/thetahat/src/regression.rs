@@ -26,7 +26,10 @@ pub(crate) use extended::{Column, DividedMonomials, ExtendedGram};
 pub(crate) use filter::{add_filtered, divide, divide_from, divide_together};
 pub(crate) use forward::{Chosen as ChosenTerm, Path, forward};
 pub(crate) use gram::{Interior, Products, gram, joint_gram};
-pub(crate) use kernel::{extended_product, extended_sum, largest, product, sum, sum_of_squares};
+pub(crate) use kernel::{
+    differences, extended_product, extended_sum, largest, product, squares_above, sum, sum_above,
+    sum_of_squares,
+};
 pub(crate) use lagged::{Lagged, Presample, Taps};
 pub(crate) use lagged_moments::LaggedMoments;
 pub(crate) use monomials::{Moments, Monomials};

@@ -106,9 +106,9 @@ impl Log {
         let signals = |names: &[String]| -> Result<Vec<&[f64]>, Error> {
             names.iter().map(|name| Ok(self.channel(name)?.values.as_slice())).collect()
         };
+        let names: Vec<&str> = inputs.iter().chain(outputs).map(String::as_str).collect();
         let (inputs, outputs) = (signals(inputs)?, signals(outputs)?);
-        let needed: Vec<&[f64]> = inputs.iter().chain(&outputs).copied().collect();
-        let segments = self.segments_of(&needed, &checked("rows", rows, self.rows())?);
+        let segments = self.segments(&names, &checked("rows", rows, self.rows())?)?;
         Ok(JointRecord { inputs, outputs, segments })
     }
 }

@@ -43,6 +43,8 @@ pub struct Channel {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Log {
     channels: Vec<Channel>,
+    /// In how many rows each of them misses its value.
+    missing: Vec<usize>,
     rows: usize,
     sample_time: f64,
     /// Seconds, one for each row, where the log came with a clock.
@@ -112,9 +114,10 @@ impl Log {
                 format!("{sample_time} is not a positive number of seconds"),
             ));
         }
-        let rows = check(&channels)?;
+        let Checked { rows, missing } = Checked::new(&channels)?;
         Ok(Self {
             channels,
+            missing,
             rows,
             sample_time,
             time: None,
@@ -152,13 +155,14 @@ impl Log {
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn recorded(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
-        let rows = check(&channels)?;
+        let Checked { rows, missing } = Checked::new(&channels)?;
         let median = median_step(&time, rows)?;
         let long = steps(&time).enumerate().filter(|(_, step)| *step > GAP * median);
         let starts: Vec<usize> = long.map(|(position, _)| position + 1).collect();
         let irregular = irregularity(&time, median, &starts);
         Ok(Self {
             channels,
+            missing,
             rows,
             sample_time: median,
             time: Some(time),
@@ -180,6 +184,7 @@ impl Log {
     /// A log on a clock that is known to be uniform.
     pub(super) fn on_clock(channels: Vec<Channel>, time: Vec<f64>, sample_time: f64) -> Self {
         Self {
+            missing: channels.iter().map(|channel| Contents::of(&channel.values).missing).collect(),
             channels,
             rows: time.len(),
             sample_time,
@@ -209,13 +214,17 @@ impl Log {
                     log.sample_time, joined.sample_time
                 )));
             }
-            for channel in &mut joined.channels {
-                let own = log.channels.iter_mut().find(|own| own.name == channel.name).ok_or_else(|| {
-                    let message =
-                        format!("log {number} has no channel '{}', which the first one has", channel.name);
-                    Error::in_channel(&channel.name, None, message)
-                })?;
-                channel.values.append(&mut own.values);
+            for (channel, missing) in joined.channels.iter_mut().zip(&mut joined.missing) {
+                let place =
+                    log.channels.iter().position(|own| own.name == channel.name).ok_or_else(|| {
+                        let message = format!(
+                            "log {number} has no channel '{}', which the first one has",
+                            channel.name
+                        );
+                        Error::in_channel(&channel.name, None, message)
+                    })?;
+                channel.values.append(&mut log.channels[place].values);
+                *missing += log.missing[place];
             }
             joined.starts.push(joined.rows);
             joined.starts.extend(log.starts.iter().map(|start| start + joined.rows));
@@ -252,9 +261,11 @@ impl Log {
                 positions.iter().filter(|position| range.contains(position) && **position > range.start);
             inside.map(|position| position - range.start).collect()
         };
+        let Checked { rows, missing } = Checked::new(&channels)?;
         Ok(Self {
-            rows: check(&channels)?,
             channels,
+            missing,
+            rows,
             sample_time: self.sample_time,
             time: self.time.as_ref().map(|time| time[range.clone()].to_vec()),
             starts: inside(&self.starts),
@@ -317,14 +328,14 @@ impl Log {
         let names: Vec<&str> = here.iter().map(|(name, _)| *name).collect();
         let mut log = self.part(&names, Rows::new(1, self.rows)?)?;
         here.iter().for_each(|(name, offset)| log.remove(name, offset));
-        let missing = |name: &str| Channel { name: name.to_owned(), values: vec![f64::NAN; self.rows] };
-        log.channels.extend(absent.iter().map(|(name, _)| missing(name)));
-        Ok(log)
+        let nowhere = |name: &str| Channel { name: name.to_owned(), values: vec![f64::NAN; self.rows] };
+        Ok(absent.iter().fold(log, |log, (name, _)| log.with_channel(nowhere(name))))
     }
 
     /// The log with a further channel, which has a value for each row, NaN where there is none.
     pub(crate) fn with_channel(mut self, channel: Channel) -> Self {
         debug_assert_eq!(channel.values.len(), self.rows);
+        self.missing.push(Contents::of(&channel.values).missing);
         self.channels.push(channel);
         self
     }
@@ -363,9 +374,14 @@ impl Log {
         self.before
     }
 
-    /// The same, to be changed in place.
-    pub(super) fn channels_mut(&mut self) -> &mut [Channel] {
-        &mut self.channels
+    /// The log with the values of its channels changed in place, side by side.
+    pub(super) fn changed(mut self, change: impl Fn(&mut [f64]) + Sync) -> Self {
+        let change = |channel: &mut Channel| {
+            change(&mut channel.values);
+            Contents::of(&channel.values).missing
+        };
+        self.missing = self.channels.par_iter_mut().map(change).collect();
+        self
     }
 
     /// The channels in their order.
@@ -378,7 +394,19 @@ impl Log {
     /// # Errors
     /// [`Error::Data`] that lists the channels there are.
     pub fn channel(&self, name: &str) -> Result<&Channel, Error> {
-        self.channels.iter().find(|channel| channel.name == name).ok_or_else(|| {
+        Ok(&self.channels[self.place(name)?])
+    }
+
+    /// In how many rows the channel of a name misses its value.
+    ///
+    /// # Errors
+    /// As for [`channel`](Self::channel).
+    pub(crate) fn missing(&self, name: &str) -> Result<usize, Error> {
+        Ok(self.missing[self.place(name)?])
+    }
+
+    fn place(&self, name: &str) -> Result<usize, Error> {
+        self.channels.iter().position(|channel| channel.name == name).ok_or_else(|| {
             let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
             Error::in_channel(
                 name,
@@ -419,17 +447,25 @@ impl Log {
     /// [`Error::Data`] for a name that is not there.
     pub(crate) fn segments(&self, names: &[&str], parts: &[Rows]) -> Result<Vec<Range<usize>>, Error> {
         self.check_uniform()?;
-        let channels: Vec<&[f64]> = names
-            .iter()
-            .map(|name| Ok(self.channel(name)?.values.as_slice()))
-            .collect::<Result<_, Error>>()?;
-        Ok(self.segments_of(&channels, parts))
+        let mut channels = Vec::new();
+        for name in names {
+            let place = self.place(name)?;
+            // Those that miss nothing need not be searched.
+            if self.missing[place] > 0 {
+                channels.push(self.channels[place].values.as_slice());
+            }
+        }
+        Ok(self.between_gaps(&channels, parts))
     }
 
     /// The same for the values of some of its channels.
     pub(crate) fn segments_of(&self, channels: &[&[f64]], parts: &[Rows]) -> Vec<Range<usize>> {
-        // Those that miss nothing need not be searched row by row.
         let channels: Vec<&[f64]> = channels.iter().copied().filter(|values| misses(values)).collect();
+        self.between_gaps(&channels, parts)
+    }
+
+    /// The same for those of them that miss a value somewhere.
+    fn between_gaps(&self, channels: &[&[f64]], parts: &[Rows]) -> Vec<Range<usize>> {
         let mut segments = Vec::new();
         for part in parts {
             let part = part.positions();
@@ -490,27 +526,67 @@ impl Interpolation {
 
 /// Checks names, lengths and infinities; gives the number of rows.
 pub(crate) fn check(channels: &[Channel]) -> Result<usize, Error> {
-    let rows = channels.first().map_or(0, |channel| channel.values.len());
-    if rows == 0 {
-        return Err(Error::data("the log has no rows"));
+    Ok(Checked::new(channels)?.rows)
+}
+
+/// Channels without infinities that go together.
+struct Checked {
+    rows: usize,
+    /// In how many of them each channel misses its value.
+    missing: Vec<usize>,
+}
+
+impl Checked {
+    fn new(channels: &[Channel]) -> Result<Self, Error> {
+        let rows = channels.first().map_or(0, |channel| channel.values.len());
+        if rows == 0 {
+            return Err(Error::data("the log has no rows"));
+        }
+        let mut names = HashSet::with_capacity(channels.len());
+        let contents: Vec<Contents> =
+            channels.par_iter().map(|channel| Contents::of(&channel.values)).collect();
+        for (channel, contents) in channels.iter().zip(&contents) {
+            let name = channel.name.as_str();
+            if !names.insert(name) {
+                return Err(Error::in_channel(name, None, format!("two channels are called '{name}'")));
+            }
+            if channel.values.len() != rows {
+                let message =
+                    format!("channel '{name}' has {} rows, the others have {rows}", channel.values.len());
+                return Err(Error::in_channel(name, None, message));
+            }
+            if let Some(row) = contents.infinite {
+                let message = format!("channel '{name}' is infinite in row {}", row + 1);
+                return Err(Error::in_channel(name, Some(row + 1), message));
+            }
+        }
+        Ok(Self { rows, missing: contents.iter().map(|contents| contents.missing).collect() })
     }
-    let mut names = HashSet::with_capacity(channels.len());
-    for channel in channels {
-        let name = channel.name.as_str();
-        if !names.insert(name) {
-            return Err(Error::in_channel(name, None, format!("two channels are called '{name}'")));
-        }
-        if channel.values.len() != rows {
-            let message =
-                format!("channel '{name}' has {} rows, the others have {rows}", channel.values.len());
-            return Err(Error::in_channel(name, None, message));
-        }
-        if let Some(row) = channel.values.iter().position(|value| value.is_infinite()) {
-            let message = format!("channel '{name}' is infinite in row {}", row + 1);
-            return Err(Error::in_channel(name, Some(row + 1), message));
-        }
+}
+
+/// What there is among values besides finite numbers.
+struct Contents {
+    /// The first that is infinite.
+    infinite: Option<usize>,
+    /// How many are missing.
+    missing: usize,
+}
+
+impl Contents {
+    fn of(values: &[f64]) -> Self {
+        let mut missing = 0;
+        // Whole blocks at once: without a way out in between they are looked at side by side.
+        let infinite = values.chunks(1024).position(|block| {
+            let infinite = block.iter().fold(false, |any, value| any | value.is_infinite());
+            missing += block.iter().map(|value| u64::from(value.is_nan())).sum::<u64>() as usize;
+            infinite
+        });
+        let infinite = infinite.and_then(|block| {
+            let first = 1024 * block;
+            Some(first + values[first..].iter().position(|value| value.is_infinite())?)
+        });
+        Self { infinite, missing }
     }
-    Ok(rows)
 }
 
 /// The runs of samples among `rows` in which no value is missing.

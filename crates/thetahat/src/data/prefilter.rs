@@ -20,7 +20,6 @@ use std::f64::consts::PI;
 use std::fmt;
 use std::str::FromStr;
 
-use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
@@ -198,10 +197,9 @@ impl Prefiltered {
         let names: Vec<&str> = inputs.iter().map(String::as_str).chain([output]).collect();
         let all = Rows::new(1, log.rows())?;
         let segments = log.segments(&names, &[all])?;
-        let mut filtered = log.part(&names, all)?;
-        filtered.channels_mut().par_iter_mut().for_each(|channel| {
+        let filtered = log.part(&names, all)?.changed(|values| {
             for segment in &segments {
-                let own = &mut channel.values[segment.clone()];
+                let own = &mut values[segment.clone()];
                 sections.iter().for_each(|section| section.apply(own));
             }
         });

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::Error;
 use crate::data::{Log, Offset};
-use crate::regression::sum;
+use crate::regression::{sum, sum_above};
 
 /// What is taken from each channel before a fit. A model speaks of deviations from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -64,7 +64,12 @@ impl Offset {
             let count: usize = rows.iter().map(Range::len).sum();
             // From the first value: the mean of a constant channel is then that constant, to the bit.
             let base = rows.first().map_or(0.0, |rows| values[rows.start]);
-            base + sum(rows.iter().cloned().flatten().map(|row| values[row] - base)) / count.max(1) as f64
+            let sum = match rows {
+                // Side by side: no row need be looked up by itself.
+                [rows] => sum_above(&values[rows.clone()], base),
+                all => sum(all.iter().cloned().flatten().map(|row| values[row] - base)),
+            };
+            base + sum / count.max(1) as f64
         };
         Ok(match detrend {
             Detrend::None => Self::default(),

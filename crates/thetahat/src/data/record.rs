@@ -97,10 +97,11 @@ impl Log {
     ) -> Result<Record<'_>, Error> {
         self.check_uniform()?;
         let signal = |name: &str| Ok(self.channel(name)?.values.as_slice());
+        let names: Vec<&str> = inputs.iter().map(String::as_str).chain(measured.then_some(output)).collect();
         let output = signal(output)?;
         let inputs: Vec<&[f64]> = inputs.iter().map(|name| signal(name)).collect::<Result<_, Error>>()?;
         let needed: Vec<&[f64]> = inputs.iter().copied().chain(measured.then_some(output)).collect();
-        let segments = self.segments_of(&needed, &checked("rows", rows, self.rows())?);
+        let segments = self.segments(&names, &checked("rows", rows, self.rows())?)?;
         let usable = |row: usize| needed.iter().all(|values| !values[row].is_nan());
         // In one pass: the row after the last missing sample before each segment.
         let (mut first, mut seen) = (0, 0);

@@ -190,6 +190,65 @@ pub(crate) fn add_filtered(target: &mut [f64], weights: &[f64], x: &[f64]) {
     }
 }
 
+/// The sum of what values are above a base, with the bits of [`sum`]. 2 flops a value.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(crate) fn sum_above(values: &[f64], base: f64) -> f64 {
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut sum = [0.0; LANES];
+    for values in chunks {
+        for lane in 0..LANES {
+            sum[lane] += values[lane] - base;
+        }
+    }
+    sum.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value - base);
+    fold(sum)
+}
+
+/// The sum of squares of what values are above a base, with the bits of [`sum`]. 3 flops a value.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(crate) fn squares_above(values: &[f64], base: f64) -> f64 {
+    let (chunks, rest) = values.as_chunks::<LANES>();
+    let mut sum = [0.0; LANES];
+    for values in chunks {
+        for lane in 0..LANES {
+            let above = values[lane] - base;
+            sum[lane] += above * above;
+        }
+    }
+    for (sum, value) in sum.iter_mut().zip(rest) {
+        *sum += (value - base) * (value - base);
+    }
+    fold(sum)
+}
+
+/// The sums of squares and of sizes of x - y, with the bits of [`sum`], and the largest size; NaN if one is. 5 flops a sample.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
+pub(crate) fn differences(x: &[f64], y: &[f64]) -> [f64; 3] {
+    let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());
+    let (mut squares, mut sizes, mut largest) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    for (x, y) in x.iter().zip(y) {
+        for lane in 0..LANES {
+            let size = (x[lane] - y[lane]).abs();
+            squares[lane] += size * size;
+            sizes[lane] += size;
+            largest[lane] = larger(largest[lane], size);
+        }
+    }
+    for (lane, (x, y)) in x_rest.iter().zip(y_rest).enumerate() {
+        let size = (x - y).abs();
+        squares[lane] += size * size;
+        sizes[lane] += size;
+        largest[lane] = larger(largest[lane], size);
+    }
+    [fold(squares), fold(sizes), largest.into_iter().fold(0.0, larger)]
+}
+
+/// The larger of two values. One that is not a number stays one.
+#[inline(always)]
+fn larger(largest: f64, value: f64) -> f64 {
+    if value > largest || value.is_nan() { value } else { largest }
+}
+
 /// The sum of `values`, in eight lanes.
 pub(crate) fn sum(mut values: impl Iterator<Item = f64>) -> f64 {
     let mut lanes = [0.0; LANES];

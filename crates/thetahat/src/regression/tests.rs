@@ -9,7 +9,9 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 
 use super::gram::gram;
 use super::noise::Noise;
-use super::{Lagged, Presample, Regression, Solver, Taps, Unsolved};
+use super::{
+    Lagged, Presample, Regression, Solver, Taps, Unsolved, differences, squares_above, sum, sum_above,
+};
 use crate::model::polynomial::product;
 use double::Double;
 
@@ -415,4 +417,22 @@ fn dependent_columns_are_named() {
         panic!("the samples are within range");
     };
     assert!(columns.len() == 1 && columns[0] > 0, "{columns:?}");
+}
+
+#[test]
+fn sums_over_slices_are_sums_to_the_bit() {
+    let mut noise = Noise(3);
+    for length in [0, 1, 7, 8, 9, 1001] {
+        let (x, mut y) = (noise.take(length), noise.take(length));
+        let base = 0.3;
+        assert_eq!(sum_above(&x, base).to_bits(), sum(x.iter().map(|x| x - base)).to_bits());
+        assert_eq!(squares_above(&x, base).to_bits(), sum(x.iter().map(|x| (x - base).powi(2))).to_bits());
+        let sizes = || x.iter().zip(&y).map(|(x, y)| (x - y).abs());
+        let expected = [sum(sizes().map(|size| size.powi(2))), sum(sizes()), sizes().fold(0.0, f64::max)];
+        assert_eq!(differences(&x, &y).map(f64::to_bits), expected.map(f64::to_bits));
+        if length > 0 {
+            y[length / 2] = f64::NAN;
+            assert!(differences(&x, &y).into_iter().all(f64::is_nan));
+        }
+    }
 }

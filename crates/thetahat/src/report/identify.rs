@@ -3,6 +3,8 @@ mod step_test;
 
 use std::ops::{ControlFlow, Range};
 
+use rayon::prelude::*;
+
 use super::fitted_rows::goes_through;
 use super::pending::{Open, OpenPolynomial, PendingEvaluation};
 use super::plan::Plan;
@@ -108,13 +110,8 @@ fn fit(
             orders,
         )?;
     }
-    let missing = names.iter().map(|name| {
-        let values = &log.channel(name)?.values;
-        Ok(Missing {
-            channel: (*name).to_owned(),
-            rows: values.iter().filter(|value| value.is_nan()).count(),
-        })
-    });
+    let missing =
+        names.iter().map(|name| Ok(Missing { channel: (*name).to_owned(), rows: log.missing(name)? }));
     let missing = missing.collect::<Result<Vec<_>, Error>>()?;
 
     let compared = Compared {
@@ -131,9 +128,10 @@ fn fit(
         Choice::Known(orders) => estimation_rows(&log, plan, orders, &estimation)?.segments,
         Choice::Grid(_) | Choice::Automatic(_) => segments.clone(),
     };
-    let signals = names
-        .iter()
-        .map(|name| deviations(&mut log, name, plan, if *name == plan.output { &segments } else { &driven }));
+    let rows_of = |name: &str| if name == plan.output { &segments } else { &driven };
+    let origins: Vec<_> = names.par_iter().map(|name| Origin::of(&log, name, plan, rows_of(name))).collect();
+    let signals =
+        names.iter().zip(origins).map(|(name, origin)| origin?.taken(&mut log, name, plan, rows_of(name)));
     let signals: Vec<Signal> = signals.collect::<Result<_, Error>>()?;
     let (output, inputs) = signals.split_last().ok_or_else(|| Error::data("there is no output"))?;
     let beside = Beside::new(&log, &segments, plan.trend)?;
@@ -408,26 +406,46 @@ fn unfiltered_variance(
     Ok(squares / samples.saturating_sub(orders.parameters()).max(1) as f64)
 }
 
-/// Takes a channel's offset from it, in place.
-fn deviations(log: &mut Log, name: &str, plan: &Plan, segments: &[Range<usize>]) -> Result<Signal, Error> {
-    let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
-    let offset = match by_hand {
-        Some(&(_, level)) => Offset { level, slope: 0.0 },
-        None => Offset::estimate(plan.detrend, log, name, segments)?,
-    };
-    let largest_of = |log: &Log| -> Result<f64, Error> {
-        let values = &log.channel(name)?.values;
-        Ok(segments.iter().map(|segment| largest(&values[segment.clone()])).fold(0.0, f64::max))
-    };
-    let before = largest_of(log)?;
-    log.remove(name, &offset);
-    let position = plan.inputs.iter().position(|input| input == name);
-    let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
-    let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
-    if position.is_none_or(used) && largest_of(log)? <= ROUNDING * before {
-        return Err(constant(name, position, known, plan.detrend == Detrend::Linear));
+/// What a channel is measured from, and how large it is before that is taken from it.
+struct Origin {
+    offset: Offset,
+    largest: f64,
+}
+
+impl Origin {
+    fn of(log: &Log, name: &str, plan: &Plan, segments: &[Range<usize>]) -> Result<Self, Error> {
+        let by_hand = plan.offsets.iter().find(|(channel, _)| channel == name);
+        let offset = match by_hand {
+            Some(&(_, level)) => Offset { level, slope: 0.0 },
+            None => Offset::estimate(plan.detrend, log, name, segments)?,
+        };
+        Ok(Self { offset, largest: largest_in(log, name, segments)? })
     }
-    Ok(Signal { name: name.to_owned(), offset })
+
+    /// Takes the offset from the channel, in place.
+    fn taken(
+        self,
+        log: &mut Log,
+        name: &str,
+        plan: &Plan,
+        segments: &[Range<usize>],
+    ) -> Result<Signal, Error> {
+        let Self { offset, largest } = self;
+        log.remove(name, &offset);
+        let position = plan.inputs.iter().position(|input| input == name);
+        let known = if let Choice::Known(orders) = &plan.choice { Some(orders) } else { None };
+        let used = |input: usize| known.is_none_or(|orders| orders.nb.get(input).is_some_and(|&nb| nb > 0));
+        if position.is_none_or(used) && largest_in(log, name, segments)? <= ROUNDING * largest {
+            return Err(constant(name, position, known, plan.detrend == Detrend::Linear));
+        }
+        Ok(Signal { name: name.to_owned(), offset })
+    }
+}
+
+/// The largest size of a channel's values in some segments.
+fn largest_in(log: &Log, name: &str, segments: &[Range<usize>]) -> Result<f64, Error> {
+    let values = &log.channel(name)?.values;
+    Ok(segments.iter().map(|segment| largest(&values[segment.clone()])).fold(0.0, f64::max))
 }
 
 /// A channel that does not change, or a straight line.

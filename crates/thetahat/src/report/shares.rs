@@ -48,11 +48,8 @@ impl Shares {
         detrend: String,
         segments: Vec<Rows>,
     ) -> Result<Data, Error> {
-        let missing = names.iter().map(|name| {
-            let values = &log.channel(name)?.values;
-            let rows = values.iter().filter(|value| value.is_nan()).count();
-            Ok(Missing { channel: (*name).to_owned(), rows })
-        });
+        let missing =
+            names.iter().map(|name| Ok(Missing { channel: (*name).to_owned(), rows: log.missing(name)? }));
         Ok(Data {
             logs: sources.to_vec(),
             digests: digests(log, names, &self.estimation)?,

@@ -39,8 +39,7 @@ pub(crate) struct Innovations {
     pub(crate) disturbance: Vec<f64>,
     /// e, one value for each of `rows`; zero where it is not known.
     pub(crate) errors: Vec<f64>,
-    /// The sum of squares of all errors that are known, and how many these are.
-    square: f64,
+    /// How many errors are known, whether they count or not.
     known: usize,
 }
 
@@ -51,7 +50,6 @@ impl Innovations {
             presample: 0,
             span: rows.clone(),
             rows,
-            square: sum_of_squares(&errors),
             known: counted.iter().map(Range::len).sum(),
             counted,
             impulses: Impulses { first: 0, weights: Vec::new() },
@@ -144,7 +142,8 @@ pub(super) fn of_segments(
         return Ok(found);
     }
     let Ok(more) = all(true) else { return Ok(found) };
-    let square = |found: &[Innovations]| found.iter().map(|found| found.square).sum::<f64>();
+    let known = |found: &Innovations| sum_of_squares(found.errors.get(found.presample..).unwrap_or_default());
+    let square = |found: &[Innovations]| found.iter().map(known).sum::<f64>();
     let unknown = |found: &[Innovations]| {
         found.iter().flat_map(|found| &found.impulses.weights).map(Vec::len).sum::<usize>()
     };
@@ -218,19 +217,7 @@ fn of_segment(
             (disturbance, errors) = residuals(model, record, &rows, presample, &impulses);
         }
     }
-    let square = sum_of_squares(&errors[presample.min(rows.len())..]);
-    Ok(Some(Innovations {
-        rows,
-        presample,
-        basis,
-        span,
-        counted,
-        impulses,
-        disturbance,
-        errors,
-        square,
-        known,
-    }))
+    Ok(Some(Innovations { rows, presample, basis, span, counted, impulses, disturbance, errors, known }))
 }
 
 /// The runs of samples that have a measured output: one for models that need past outputs, as their segments miss none.

@@ -88,11 +88,11 @@ pub(super) fn predicted(
 ) -> Response {
     let response = disturbance_response(model, horizon);
     let weights: Vec<f64> = response.iter().map(|h| -h).collect();
-    let mut predicted = Response::empty(record.output.len());
+    let counted = innovations.iter().flat_map(|found| found.counted.iter().cloned()).collect();
+    let mut predicted = Response::of_signal(record.output, counted);
     for found in innovations {
         for counted in &found.counted {
             let values = &mut predicted.values[counted.clone()];
-            values.copy_from_slice(&record.output[counted.clone()]);
             let rows = counted.start - found.rows.start..counted.end - found.rows.start;
             add_filtered(values, &rows, &weights, &found.errors, 0);
         }
@@ -101,7 +101,6 @@ pub(super) fn predicted(
                 predicted.values[row] = -found.disturbance[row - found.rows.start];
             }
         }
-        predicted.counted.extend(found.counted.iter().cloned());
     }
     predicted
 }

@@ -68,7 +68,6 @@ pub fn simulate(
 ) -> Result<Response, Error> {
     check_inputs(model, record)?;
     let conditioned = model.orders.conditioned();
-    let mut response = Response::empty(record.output.len());
     let mut free = Free::new(model, record);
     for (segment, past) in record.segments.iter().zip(&record.past) {
         let lag =
@@ -96,22 +95,16 @@ pub fn simulate(
         } else {
             divide(&model.a, &mut values);
         }
-        if start == InitialCondition::Estimate {
-            free.runs.push(Run { rows: run, past: *past, values });
-            continue;
-        }
-        response.values[run.clone()].copy_from_slice(&values);
-        response.counted.extend(measured(record.output, &run));
+        free.runs.push(Run { rows: run, past: *past, values });
     }
-    for Run { rows, values, .. } in free.completed()? {
-        response.values[rows.clone()].copy_from_slice(&values);
-        response.counted.extend(measured(record.output, &rows));
-    }
-    Ok(response)
+    let runs = if start == InitialCondition::Estimate { free.completed()? } else { free.runs };
+    let counted = runs.iter().flat_map(|run| measured(record.output, &run.rows)).collect();
+    let runs = runs.into_iter().map(|run| (run.rows, run.values)).collect();
+    Ok(Response::of_runs(record.output.len(), runs, counted))
 }
 
 /// The free run of a segment.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Run {
     rows: Range<usize>,
     /// How many measured samples stand before it.
@@ -156,25 +149,44 @@ impl<'a> Free<'a> {
         let filtered = self.model.f.iter().filter(|f| f.len() > 1).map(|f| response(&[a, f]));
         self.responses = std::iter::once(response(&[a])).chain(filtered).collect();
         let all = |with_inputs: bool| -> Result<Vec<Completed>, Error> {
-            self.runs.iter().filter_map(|run| self.complete(run, with_inputs).transpose()).collect()
+            let each = self.runs.iter().enumerate();
+            each.filter_map(|(index, run)| self.complete(index, run, with_inputs).transpose()).collect()
         };
         let found = all(false)?;
         let matters = |run: &Run| self.counts(run.past, true) != self.counts(run.past, false);
         let more = if self.runs.iter().any(matters) { all(true).ok() } else { None };
-        let square = |found: &[Completed]| found.iter().map(|run| run.square).sum::<f64>();
+        let square = |found: &[Completed]| found.iter().map(|run| self.square_of(run)).sum::<f64>();
         let unknown = |found: &[Completed]| found.iter().map(|run| run.unknown).sum::<usize>();
-        let samples = found.iter().map(|run| run.samples).sum::<usize>();
-        let nothing = NOTHING_LEFT * found.iter().map(|run| run.output).sum::<f64>();
         let worth = |more: &Vec<Completed>| {
             let extra = unknown(more).saturating_sub(unknown(&found));
-            extra > 0 && are_worth(samples, square(&found), square(more), extra, nothing)
+            if extra == 0 {
+                return false;
+            }
+            let samples = found.iter().map(|run| run.samples).sum::<usize>();
+            let output = |run: &Completed| sum(run.rows().map(|row| self.output[row].powi(2)));
+            let nothing = NOTHING_LEFT * found.iter().map(output).sum::<f64>();
+            are_worth(samples, square(&found), square(more), extra, nothing)
         };
         let best = more.filter(worth).unwrap_or(found);
-        Ok(best.into_iter().map(|completed| completed.run).collect())
+        let mut runs: Vec<Option<Run>> = self.runs.into_iter().map(Some).collect();
+        let completed = best.into_iter().filter_map(|Completed { run, head, .. }| {
+            let mut run = runs.get_mut(run)?.take()?;
+            run.values[..head.len()].copy_from_slice(&head);
+            Some(run)
+        });
+        Ok(completed.collect())
     }
 
-    /// A run with its initial conditions, if it has more measured samples than these are.
-    fn complete(&self, run: &Run, with_inputs: bool) -> Result<Option<Completed>, Error> {
+    /// The sum of squares of what a run leaves.
+    fn square_of(&self, completed: &Completed) -> f64 {
+        let Completed { run, head, .. } = completed;
+        let Run { rows, values, .. } = &self.runs[*run];
+        let value = |t: usize| head.get(t).copied().unwrap_or_else(|| values[t]);
+        sum(completed.rows().map(|row| (self.output[row] - value(row - rows.start)).powi(2)))
+    }
+
+    /// What begins a run with its initial conditions, if it has more measured samples than these are.
+    fn complete(&self, index: usize, run: &Run, with_inputs: bool) -> Result<Option<Completed>, Error> {
         let measured = measured(self.output, &run.rows);
         let samples: usize = measured.iter().map(Range::len).sum();
         let mut counts = self.counts(run.past, with_inputs);
@@ -185,32 +197,29 @@ impl<'a> Free<'a> {
         if samples <= unknown {
             return Ok(None);
         }
-        let mut values = run.values.clone();
-        if unknown > 0 {
-            self.add_closest(&self.output[run.rows.clone()], &counts, samples < run.rows.len(), &mut values)?;
-        }
-        let first = run.rows.start;
-        let rows = || measured.iter().cloned().flatten();
-        let square = sum(rows().map(|row| (self.output[row] - values[row - first]).powi(2)));
-        let output = sum(rows().map(|row| self.output[row].powi(2)));
-        let run = Run { values, ..run.clone() };
-        Ok(Some(Completed { run, samples, unknown, square, output }))
+        let head = if unknown > 0 {
+            self.closest(&self.output[run.rows.clone()], &counts, samples < run.rows.len(), &run.values)?
+        } else {
+            Vec::new()
+        };
+        Ok(Some(Completed { run: index, head, measured, samples, unknown }))
     }
 
-    /// Adds the combination of initial-condition responses that brings `values` closest to `output`, which may have gaps.
-    fn add_closest(
+    /// The first of `values`, with the combination of initial-condition responses that brings them closest to `output`, which may
+    /// have gaps. It does nothing to those after them.
+    fn closest(
         &self,
         output: &[f64],
         counts: &[usize],
         gaps: bool,
-        values: &mut [f64],
-    ) -> Result<(), Error> {
+        values: &[f64],
+    ) -> Result<Vec<f64>, Error> {
         // After the last initial-condition response there is nothing to fit.
         let used = || self.responses.iter().zip(counts).filter(|(_, count)| **count > 0);
         let ends = used().map(|(response, count)| response.len() + count);
         let length = ends.max().unwrap_or(0).max(counts.iter().sum::<usize>() + 1).min(output.len());
         let error = |(y, x): (&f64, &f64)| if y.is_nan() { 0.0 } else { y - x };
-        let target: Vec<f64> = output.iter().zip(&*values).take(length).map(error).collect();
+        let target: Vec<f64> = output.iter().zip(values).take(length).map(error).collect();
         let fitted = |response: &[f64]| {
             let mut fitted = response[..response.len().min(length)].to_vec();
             fitted.resize(length, 0.0);
@@ -238,19 +247,27 @@ impl<'a> Free<'a> {
                 |(signal, count): (&Vec<f64>, &usize)| Delays { signal: signal.clone(), count: *count };
             closest(&target, &self.responses.iter().zip(counts).map(delays).collect::<Vec<_>>())?
         };
+        let mut head = values[..length].to_vec();
         for (weights, response) in weights.iter().zip(&self.responses) {
-            add_filtered(&mut values[..length], &(0..length), weights, &fitted(response), 0);
+            add_filtered(&mut head, &(0..length), weights, &fitted(response), 0);
         }
-        Ok(())
+        Ok(head)
     }
 }
 
-/// A run with its initial conditions: over how many samples they were estimated, how many they are, and the sums of squares of
-/// what they leave and of the output.
+/// Which run has which initial conditions.
 struct Completed {
-    run: Run,
+    run: usize,
+    /// Its first values with them; the others are as they were.
+    head: Vec<f64>,
+    /// The samples over which they were estimated, how many these are, and how many initial conditions.
+    measured: Vec<Range<usize>>,
     samples: usize,
     unknown: usize,
-    square: f64,
-    output: f64,
+}
+
+impl Completed {
+    fn rows(&self) -> impl Iterator<Item = usize> {
+        self.measured.iter().cloned().flatten()
+    }
 }

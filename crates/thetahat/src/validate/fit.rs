@@ -1,8 +1,11 @@
+use std::borrow::Cow;
+use std::ops::Range;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::Rows;
-use crate::regression::sum;
+use crate::regression::{differences, squares_above, sum_above};
 use crate::respond::{Horizon, InitialCondition, Response};
 
 /// What rows serve for.
@@ -62,17 +65,8 @@ impl Fit {
         part: Option<Part>,
         (horizon, initial): (Horizon, InitialCondition),
     ) -> Self {
-        let figures = match response.counted.as_slice() {
-            // Side by side: no row need be looked up by itself.
-            [counted] => {
-                let measured = measured[counted.clone()].iter().copied();
-                figures(measured.zip(response.values[counted.clone()].iter().copied()))
-            }
-            all => {
-                let counted = all.iter().cloned().flatten();
-                figures(counted.map(|t| (measured[t], response.values[t])))
-            }
-        };
+        let counted = |values| counted(values, &response.counted);
+        let figures = figures(&counted(measured), &counted(&response.values));
         Self {
             output: output.to_owned(),
             rows: rows.to_vec(),
@@ -97,20 +91,26 @@ struct Figures {
     largest_error: Option<f64>,
 }
 
-/// Those of pairs of a measured value and what a model says.
-fn figures(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Figures {
-    let n = pairs.clone().count() as f64;
-    let mean = sum(pairs.clone().map(|(measured, _)| measured)) / n;
-    let error = sum(pairs.clone().map(|(measured, said)| (measured - said).powi(2))).sqrt();
-    let spread = sum(pairs.clone().map(|(measured, _)| (measured - mean).powi(2))).sqrt();
-    let errors = || pairs.clone().map(|(measured, said)| (measured - said).abs());
-    // One that is not a number stays one.
-    let largest = errors().fold(0.0_f64, |largest, e| if e > largest || e.is_nan() { e } else { largest });
+/// The values that count, one after the other.
+fn counted<'v>(values: &'v [f64], runs: &[Range<usize>]) -> Cow<'v, [f64]> {
+    match runs {
+        [run] => Cow::Borrowed(&values[run.clone()]),
+        runs => Cow::Owned(runs.iter().flat_map(|run| &values[run.clone()]).copied().collect()),
+    }
+}
+
+/// Those of measured values and what a model says of them.
+fn figures(measured: &[f64], said: &[f64]) -> Figures {
+    let n = measured.len() as f64;
+    let mean = sum_above(measured, 0.0) / n;
+    let spread = squares_above(measured, mean).sqrt();
+    let [squares, sizes, largest] = differences(measured, said);
+    let error = squares.sqrt();
     let finite = |figure: f64| Some(figure).filter(|figure| figure.is_finite());
     Figures {
         percent: finite(100.0 * (1.0 - error / spread)),
         rmse: finite(error / n.sqrt()),
-        mean_absolute_error: finite(sum(errors()) / n),
+        mean_absolute_error: finite(sizes / n),
         largest_error: finite(largest).filter(|_| n > 0.0),
     }
 }

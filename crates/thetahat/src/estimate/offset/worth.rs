@@ -7,7 +7,7 @@ use super::super::{Estimate, Initial, Norm, Procedure, arx};
 use crate::data::Record;
 use crate::model::Orders;
 use crate::optimize::{Objective, best_free};
-use crate::regression::{Presample, sum};
+use crate::regression::{Presample, sum, sum_above};
 
 /// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
 const DEPENDENT: f64 = 1e-9;
@@ -116,11 +116,11 @@ fn sums(record: &Record<'_>, orders: &Orders, estimate: &Estimate) -> (Vec<f64>,
                 begin..segment.end.saturating_sub(lag).max(begin)
             };
             let mut known = rows(first);
-            let mut total = sum(signal[known.clone()].iter().copied());
+            let mut total = sum_above(&signal[known.clone()], 0.0);
             for (lag, all) in (first..).zip(&mut sums) {
                 let next = rows(lag);
-                total += sum(signal[next.start..known.start].iter().copied());
-                total -= sum(signal[next.end..known.end].iter().copied());
+                total += sum_above(&signal[next.start..known.start], 0.0);
+                total -= sum_above(&signal[next.end..known.end], 0.0);
                 known = next;
                 *all += total;
             }

@@ -22,6 +22,10 @@ pub(crate) struct Experiments(Arc<Described>);
 
 #[pymethods]
 impl Experiments {
+    /// The fit asks for all rows of fewer than these.
+    #[classattr]
+    const FETCHED_BELOW: usize = Described::FETCHED_BELOW;
+
     /// Those of a log, with the options of `thetahat fit`.
     #[new]
     fn new(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Self> {

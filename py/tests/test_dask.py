@@ -234,7 +234,8 @@ def test_a_search_over_experiments(client: Any) -> None:
     assert np.allclose(model.standard_errors, whole.standard_errors, rtol=1e-4, atol=0)
     assert model.document["data"]["rows"] == 300_000
     assert model.to_json() == thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json()
-    # Whoever has them.
+    # Whoever has them, one or several in a task.
+    assert thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2, per_task=1).to_json() == model.to_json()
     with dask.config.set(scheduler="synchronous"):
         assert thetahat.dask.fit_experiments(logs, th.oe, nb=2, nf=2).to_json() == model.to_json()
     short = {name: log[:300] for name, log in logs.items()}

@@ -100,7 +100,7 @@ pub(crate) use process::{
 pub use refinement::{Refine, RefinementOutcome};
 pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
-pub(crate) use stretches::{seen_by_starts, stretches};
+pub(crate) use stretches::{LONG, seen_by_starts, stretches};
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{
     Ordered, SegmentStart, SubspaceErrors, SubspaceSums, joint_products, joint_taps, products_of_innovations,

@@ -176,6 +176,7 @@ class Model:
 
 @final
 class Experiments:
+    FETCHED_BELOW: int
     def __new__(cls, log: Log, options: Sequence[str]) -> Experiments: ...
     @staticmethod
     def from_json(text: str) -> Experiments: ...

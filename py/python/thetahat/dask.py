@@ -23,6 +23,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain, islice
 from pathlib import PurePosixPath
 from typing import Any, NamedTuple, Union
 
@@ -46,13 +47,16 @@ from thetahat._state_space import ss
 __all__ = ["fit_experiments", "fit_many", "normal_equations", "rows"]
 
 Logs = Union[str, Iterable[Any], Mapping[str, Any], "dask.bag.Bag", "dask.dataframe.DataFrame"]
+_Run = Sequence["tuple[str, Any]"]
+"""Logs with their names, one after the other."""
+_Share = Sequence[_Run]
 
 _TASKS = 16
 """A task has one log unless each worker has more tasks than this: the scheduler takes some milliseconds for a task."""
 _MOST = 32
 """The logs of a task, at most: so many are done again when a worker is lost."""
-_SHORT = 1 << 18
-"""Fewer rows in all are fetched: a message takes as long as an iteration on them."""
+_ASKED = 4
+"""The tasks that a search asks on each thread of the workers, at most: the scheduler takes as long for one as an iteration on 10^5 rows."""
 _FRONT = 16
 """Rows at the front of some pieces beside those that the model reaches back to: their steps are its sample time."""
 
@@ -230,7 +234,7 @@ def fit_experiments(
     read : dict, optional
         How experiments are read, as for `thetahat.fit_many`.
     per_task : int, optional
-        How many experiments a task has: unless said otherwise as many as give some 16 tasks, and 32 at most. More for short ones.
+        How many experiments a task has: unless said otherwise as many as leave four tasks for each thread of the workers.
     **options
         The arguments of ``fit``. All rows serve for the fit, and what is taken from the channels is the mean over all, or nothing.
 
@@ -246,8 +250,9 @@ def fit_experiments(
 
     Notes
     -----
-    An iteration takes O(N p) operations on a worker for its N rows, and one message to each task of at most 32 experiments.
-    Parameters are those of one process to 1e-8 of their size, whatever the workers.
+    An iteration takes O(N p) operations on a worker for its N rows, and one message to each task. A sum is over a 16th of the
+    experiments, and 32 at most (or ``per_task``): the same experiments give the same bytes, whatever the workers. Parameters are those
+    of one process to 1e-8 of their size.
 
     Examples
     --------
@@ -276,44 +281,49 @@ def fit_experiments(
         return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve(), stacklevel=3)
     work = _many.Work(read=dict(read or {}))
     runs = _runs(_pieces(logs), per_task)
+    shares = _shares(runs, per_task)
     if fit is grey:
-        return told(_equations(work, runs, bound.arguments), stacklevel=3)
+        return told(_equations(work, shares, bound.arguments), stacklevel=3)
     own = words(fit.__name__, bound.arguments)
-    held = dask.persist(*[dask.delayed(_experiments)(work, run, own) for run in runs])
-    known = dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])
-    every = _together([(run[0][0], _thetahat.Experiments.from_json(text)) for run, (text, _) in zip(runs, known)])
+    held = dask.persist(*[dask.delayed(_experiments)(work, share, own) for share in shares])
+    known = list(chain(*dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])))
+    every = _together([(run[0][0], _thetahat.Experiments.from_json(text)) for run, (_, text) in zip(runs, known)])
     offsets = every.offsets(own)
     if every.are_fetched:
-        logs = [log for _, log in known]
-        near = [_deviations(log, own, offsets) for log in (logs if all(logs) else dask.compute(*[part[0] for part in held]))]
-        found = every.fit(own, lambda questions: [_answer(log, own, question) for log, question in zip(near, questions)])
+        fetched = known if all(log is not None for log, _ in known) else chain(*dask.compute(*held))
+        near = _deviations(fetched, own, offsets)
+        found = every.fit(own, lambda questions: _answers(near, questions, own))
     else:
-        held = dask.persist(*[dask.delayed(_deviations)(part[0], own, offsets) for part in held])
-        found = every.fit(own, _asking(_answer, held, own))
+        held = dask.persist(*[dask.delayed(_deviations)(part, own, offsets) for part in held])
+        found = every.fit(own, _asking(_answers, held, shares, own))
     return told(Model._of(found), stacklevel=3)
 
 
-def _asking(answer: Callable[..., bytes], held: Sequence[Any], *arguments: Any) -> Callable[[list[bytes]], list[bytes]]:
-    """Asks all who hold experiments at once."""
+def _asking(
+    answers: Callable[..., list[bytes]], held: Sequence[Any], shares: Sequence[Sequence[Any]], *arguments: Any
+) -> Callable[[list[bytes]], list[bytes]]:
+    """Asks all who hold experiments at once, each the questions about its runs."""
     # From another thread.
     context = contextvars.copy_context()
 
     def ask(questions: list[bytes]) -> list[bytes]:
-        tasks = [dask.delayed(answer, pure=False)(part, *arguments, question) for part, question in zip(held, questions)]
-        return list(context.run(dask.compute, *tasks))
+        left = iter(questions)
+        asked = [(part, list(islice(left, len(share)))) for part, share in zip(held, shares)]
+        tasks = [dask.delayed(answers, pure=False)(part, own, *arguments) for part, own in asked]
+        return list(chain(*context.run(dask.compute, *tasks)))
 
     return ask
 
 
-def _equations(work: _many.Work, runs: Sequence[Sequence[tuple[str, Any]]], arguments: Mapping[str, Any]) -> Model:
+def _equations(work: _many.Work, shares: Sequence[_Share], arguments: Mapping[str, Any]) -> Model:
     """A model in equations, of which the workers compute the likelihood."""
     box = arguments["model"] if isinstance(arguments["model"], GreyBox) else GreyBox(arguments["model"])
-    held = dask.persist(*[dask.delayed(_joined)(work, run) for run in runs])
-    logs = dask.compute(*held)
+    held = dask.persist(*[dask.delayed(_joined)(work, share) for share in shares])
+    logs = list(chain(*dask.compute(*held)))
     counts = [len(log.experiments) for log in logs]
     own = _options.words(EquationsOptions, arguments)
     log = Log.join(logs)._log
-    return Model._of(_thetahat.fit_equations_distributed(log, box._model, own, counts, _asking(_answer_equations, held, box)))
+    return Model._of(_thetahat.fit_equations_distributed(log, box._model, own, counts, _asking(_equations_answers, held, shares, box)))
 
 
 def _pieces(logs: Logs) -> list[tuple[str, Any]]:
@@ -331,24 +341,34 @@ def _pieces(logs: Logs) -> list[tuple[str, Any]]:
     return named
 
 
-def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None, finer: int = 1) -> list[Sequence[tuple[str, Any]]]:
-    """What each task has. How much does not depend on the workers: the same pieces give the same bytes."""
+def _runs(named: Sequence[tuple[str, Any]], per_task: int | None = None, finer: int = 1) -> list[_Run]:
+    """The pieces that one sum is over. How many does not depend on the workers: the same pieces give the same bytes."""
     count = _count(per_task, max(1, min(_MOST, len(named) // (finer * _TASKS))))
     return [named[first : first + count] for first in range(0, len(named), count)]
 
 
-def _experiments(work: _many.Work, run: Sequence[tuple[str, Any]], own: Sequence[str]) -> tuple[Log, str]:
-    """Some experiments as one log, and what is known of them."""
+def _shares(runs: Sequence[_Run], per_task: int | None) -> list[_Share]:
+    """The runs that each task of a search has: one where it is said how much that is, or where no worker has come yet."""
+    tasks = len(runs) if per_task is not None else min(len(runs), _ASKED * _workers() or len(runs))
+    cuts = [len(runs) * task // tasks for task in range(tasks + 1)]
+    return [runs[first:last] for first, last in zip(cuts, cuts[1:])]
+
+
+def _experiments(work: _many.Work, share: _Share, own: Sequence[str]) -> list[tuple[Log, str]]:
+    """The experiments of each run as one log, and what is known of them."""
+    with _shared():
+        return [_described_run(work, run, own) for run in share]
+
+
+def _described_run(work: _many.Work, run: _Run, own: Sequence[str]) -> tuple[Log, str]:
     logs: list[Log] = []
     described = []
-    with _shared():
-        for name, item in run:
-            log = _loaded(work, name, item)
-            with _in_piece(name):
-                described.append((name, _thetahat.Experiments(log._log, own)))
-            logs.append(log)
-        every = _together(described).joined()
-        return Log.join(logs), every.to_json()
+    for name, item in run:
+        log = _loaded(work, name, item)
+        with _in_piece(name):
+            described.append((name, _thetahat.Experiments(log._log, own)))
+        logs.append(log)
+    return Log.join(logs), _together(described).joined().to_json()
 
 
 def _together(described: Sequence[tuple[str, _thetahat.Experiments]]) -> _thetahat.Experiments:
@@ -360,31 +380,31 @@ def _together(described: Sequence[tuple[str, _thetahat.Experiments]]) -> _thetah
     return every
 
 
-def _joined(work: _many.Work, run: Sequence[tuple[str, Any]]) -> Log:
-    """Some experiments as one log."""
+def _joined(work: _many.Work, share: _Share) -> list[Log]:
+    """The experiments of each run as one log."""
     with _shared():
-        return Log.join([_loaded(work, name, item) for name, item in run])
+        return [Log.join([_loaded(work, name, item) for name, item in run]) for run in share]
 
 
-def _answer_equations(log: Log, box: GreyBox, question: bytes) -> bytes:
+def _equations_answers(part: Iterable[Log], questions: Iterable[bytes], box: GreyBox) -> list[bytes]:
     with _shared():
-        return _thetahat.answer_equations(log._log, box._model, question)
+        return [_thetahat.answer_equations(log._log, box._model, question) for log, question in zip(part, questions)]
 
 
-def _described(part: tuple[Log, str], count: int) -> tuple[str, Log | None]:
-    """What is known of some experiments, and they themselves where so many as short as these are fetched."""
-    log, text = part
-    return text, log if count * len(log) < _SHORT else None
+def _described(part: Iterable[tuple[Log, str]], count: int) -> list[tuple[Log | None, str]]:
+    """What is known of the experiments of each run, and they themselves where so many runs as short as it are fetched."""
+    fetched = _thetahat.Experiments.FETCHED_BELOW
+    return [(log if count * len(log) < fetched else None, text) for log, text in part]
 
 
-def _deviations(log: Log, own: Sequence[str], offsets: Sequence[float]) -> Log:
+def _deviations(part: Iterable[tuple[Any, str]], own: Sequence[str], offsets: Sequence[float]) -> list[Log]:
     with _shared():
-        return Log._of(_thetahat.deviations(log._log, own, offsets), log._clock)
+        return [Log._of(_thetahat.deviations(log._log, own, offsets), log._clock) for log, _ in part]
 
 
-def _answer(log: Log, own: Sequence[str], question: bytes) -> bytes:
+def _answers(part: Iterable[Log], questions: Iterable[bytes], own: Sequence[str]) -> list[bytes]:
     with _shared():
-        return _thetahat.answer(log._log, own, question)
+        return [_thetahat.answer(log._log, own, question) for log, question in zip(part, questions)]
 
 
 @contextmanager
@@ -556,7 +576,7 @@ def _tasks(
     named = _many.name_all(logs)
     files = _many.reports_of([name for name, _ in named], named, reports)
     triples = [(name, item, file) for (name, item), file in zip(named, files)]
-    count = _count(per_task, max(1, min(_MOST, len(triples) // (_TASKS * _workers()))))
+    count = _count(per_task, max(1, min(_MOST, len(triples) // (_TASKS * max(1, _workers())))))
     tasks = [triples[first : first + count] for first in range(0, len(triples), count)]
     return [dask.delayed(_each)(work, task, None) for task in tasks]
 
@@ -570,11 +590,11 @@ def _count(per_task: int | None, default: int) -> int:
 
 
 def _workers() -> int:
-    """How many tasks run at the same time on the cluster; without one, as many as there are cores."""
+    """How many tasks run at the same time on the cluster, none before it has workers; without one, as many as there are cores."""
     try:
         from distributed import get_client
 
-        return sum(get_client().nthreads().values()) or 1
+        return sum(get_client().nthreads().values())
     except (ImportError, ValueError):
         return os.cpu_count() or 1
 

@@ -6,7 +6,7 @@ use crate::data::{JointRecord, Record, measured};
 use crate::regression::sum_of_squares;
 
 /// From so many samples on, starts see stretches of the record only.
-const LONG: usize = 1 << 18;
+pub(crate) const LONG: usize = 1 << 18;
 const STRETCHES: usize = 8;
 const STRETCH: usize = 1 << 12;
 

@@ -16,8 +16,8 @@ use super::totals::Totals;
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Record, Rows, Source, digests};
 use crate::estimate::{
-    Answer, Ask, Beside, Constant, Distributed, ExperimentData, Fitted, Holders, Initial, Method, Question,
-    Task, enough, seen_by_starts,
+    Answer, Ask, Beside, Constant, Distributed, ExperimentData, Fitted, Holders, Initial, LONG, Method,
+    Question, Task, enough, seen_by_starts,
 };
 use crate::model::{Orders, Structure};
 use crate::optimize::Monitor;
@@ -30,7 +30,7 @@ use crate::select::{Choice, Focus};
 /// [offsets](Self::offsets) of all from its channels ([`deviations`](Self::deviations)), and the [fit](Self::fit) asks all of them at once for sums over their rows
 /// ([`answer`](Self::answer)): the cost, its gradient and its Gram matrix at the point where the search stands. The estimate is the one that
 /// [`identify`](super::identify()) finds in the joined log, but for the order in which sums are added. Starts are found in some rows of all:
-/// logs of fewer than 262,144 rows together are fetched whole.
+/// logs of fewer than [`FETCHED_BELOW`](Self::FETCHED_BELOW) rows together are fetched whole.
 ///
 /// ```text
 /// J = sum e^2,   g = sum psi e,   G = sum psi psi',   psi = -de/dtheta
@@ -96,6 +96,9 @@ struct Holder {
 }
 
 impl Experiments {
+    /// The fit asks for all rows of fewer than these: starts see them all.
+    pub const FETCHED_BELOW: usize = LONG;
+
     /// Those of a log, which may be [joined](Log::join) of several.
     ///
     /// # Errors

@@ -75,7 +75,13 @@ impl<'a> Section<'a> {
         let used = |signal: usize| {
             signal == 0 || layout.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
         };
-        let buffer = |used: bool| if used { vec![0.0; length] } else { Vec::new() };
+        // Written when it is known what: a predictor may serve one question, and zeros first would be a tenth of its time.
+        let buffer = |used: bool| Vec::with_capacity(if used { length } else { 0 });
+        let signal = |signal: usize| {
+            // Behind an impulse response is nothing.
+            let responds = signal == layout.impulse || layout.frees.contains(&signal);
+            if responds && used(signal) { vec![0.0; length] } else { buffer(used(signal)) }
+        };
         let (parameters, free) = (layout.parameters, layout.free);
         let columns = parameters + free;
         let size = layout.products.size();
@@ -85,7 +91,7 @@ impl<'a> Section<'a> {
             first: rows.start,
             output: &record.output[rows.clone()],
             inputs: record.inputs.iter().map(|input| &input[rows.clone()]).collect(),
-            signals: (0..layout.signals).map(|signal| buffer(used(signal))).collect(),
+            signals: (0..layout.signals).map(signal).collect(),
             supports: vec![usize::MAX; layout.signals],
             responses: layout.orders.nf.iter().map(|&nf| buffer(nf > 0)).collect(),
             disturbance: buffer(layout.orders.nd > 0),
@@ -138,8 +144,8 @@ impl<'a> Section<'a> {
                     divide(&polynomials.f[j], piece);
                     let size = sum_of_squares(piece);
                     if layout.orders.nd > 0 {
-                        multiply(&mut self.scratch[..known], &polynomials.d, piece);
-                        piece.copy_from_slice(&self.scratch[..known]);
+                        multiply(&mut self.scratch, &polynomials.d, piece);
+                        piece.copy_from_slice(&self.scratch);
                     }
                     piece[..layout.conditioned].fill(0.0);
                     divide(&polynomials.c, &mut piece[layout.conditioned..]);
@@ -183,7 +189,8 @@ impl<'a> Section<'a> {
                 continue;
             }
             let x = &mut self.responses[j];
-            x.fill(0.0);
+            x.clear();
+            x.resize(self.output.len(), 0.0);
             delayed(x, layout.orders.nk[j], &polynomials.b[j], u);
             let (weights, rest) = free.split_at(layout.own_free[j]);
             free = rest;
@@ -208,30 +215,30 @@ impl<'a> Section<'a> {
     pub(super) fn linearize(&mut self, layout: &Layout, polynomials: &Polynomials) {
         let orders = &layout.orders;
         if orders.na > 0 {
-            self.signals[layout.output].copy_from_slice(self.output);
+            self.output.clone_into(&mut self.signals[layout.output]);
         }
         for j in 0..orders.inputs() {
             if orders.nb[j] > 0 {
-                self.signals[layout.inputs[j]].copy_from_slice(self.inputs[j]);
+                self.inputs[j].clone_into(&mut self.signals[layout.inputs[j]]);
             }
             if orders.nf[j] > 0 {
                 let two = [layout.inputs[j], layout.responses[j]];
                 if let Ok([u, x]) = self.signals.get_disjoint_mut(two) {
-                    x.copy_from_slice(&self.responses[j]);
+                    x.clone_from(&self.responses[j]);
                     divide_together(&polynomials.f[j], [u, x]);
                 }
             }
         }
         if orders.nc > 0 {
             let (error, others) = self.signals.split_at_mut(1);
-            others[layout.error - 1].copy_from_slice(&error[0]);
+            others[layout.error - 1].clone_from(&error[0]);
         }
         if orders.nd > 0 {
             for &signal in &layout.with_noise_denominator {
                 multiply(&mut self.scratch, &polynomials.d, &self.signals[signal]);
                 std::mem::swap(&mut self.scratch, &mut self.signals[signal]);
             }
-            self.signals[layout.disturbance].copy_from_slice(&self.disturbance);
+            self.signals[layout.disturbance].clone_from(&self.disturbance);
         }
         for &signal in &layout.filtered {
             let head = &mut self.signals[signal][..layout.conditioned];
@@ -284,8 +291,8 @@ impl<'a> Section<'a> {
                 divide(&polynomials.f[input], piece);
                 size = sum_of_squares(piece);
                 if orders.nd > 0 {
-                    multiply(&mut self.scratch[..known], &polynomials.d, piece);
-                    piece.copy_from_slice(&self.scratch[..known]);
+                    multiply(&mut self.scratch, &polynomials.d, piece);
+                    piece.copy_from_slice(&self.scratch);
                 }
                 let (head, _) = piece.split_at_mut(conditioned);
                 self.heads[signal * conditioned..][..conditioned].copy_from_slice(head);
@@ -458,7 +465,7 @@ fn divide_all(monic: &[f64], signals: &mut [Vec<f64>], which: &[usize], from: us
 }
 
 /// `target = P values` for a monic P.
-fn multiply(target: &mut [f64], monic: &[f64], values: &[f64]) {
-    target.copy_from_slice(values);
+fn multiply(target: &mut Vec<f64>, monic: &[f64], values: &[f64]) {
+    values.clone_into(target);
     delayed(target, 1, &monic[1..], values);
 }

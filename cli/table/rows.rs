@@ -66,21 +66,15 @@ impl Rows {
 
     /// Makes room for `more` rows; in all there will be about `total`.
     ///
-    /// Growing by doubling would hold half as much again as the table needs. The first memory comes as zeros from the system,
-    /// so that only what is written to is there, and the threads that write to it share the work of getting it.
+    /// Growing by doubling would hold half as much again as the table needs.
     fn make_room(&mut self, more: usize, total: usize) {
         let needed = self.count + more;
         let total = total.max(needed);
         for column in &mut self.columns {
             if column.len() < needed {
                 // Only an estimate: without the memory for it the table may still fit.
-                let is_there = column.try_reserve_exact(total - column.len()).is_ok();
-                if column.is_empty() && is_there {
-                    *column = Vec::new();
-                    *column = vec![0.0; total];
-                } else {
-                    column.resize(needed, 0.0);
-                }
+                let _ = column.try_reserve_exact(total - column.len());
+                column.resize(needed, 0.0);
             }
         }
     }

@@ -543,8 +543,8 @@ impl Checked {
             return Err(Error::data("the log has no rows"));
         }
         let mut names = HashSet::with_capacity(channels.len());
-        let contents: Vec<Contents> =
-            channels.par_iter().map(|channel| Contents::of(&channel.values)).collect();
+        // On this thread: a forked process makes logs, and has none of its parent's threads.
+        let contents: Vec<Contents> = channels.iter().map(|channel| Contents::of(&channel.values)).collect();
         for (channel, contents) in channels.iter().zip(&contents) {
             let name = channel.name.as_str();
             if !names.insert(name) {

@@ -268,7 +268,7 @@ def fit_experiments(
     """
     if fit not in (oe, armax, bj, arma, general, grey, arx, ar, fir, ss):
         name = getattr(fit, "__name__", fit)
-        raise ValueError(f"fit: {name!r} fits no one model to experiments; give thetahat.oe, armax, bj, arma, general or grey")
+        raise ValueError(f"fit: {name!r} fits no one model to experiments; give thetahat.oe, armax, bj, arma, general, grey or ss")
     bound = inspect.signature(fit).bind(None, **options)
     bound.apply_defaults()
     if fit is ss:
@@ -276,7 +276,7 @@ def fit_experiments(
         horizons = options.pop("past", None), options.pop("future", None)
         options.update(order="auto" if order is None else order, horizons=horizons)
     if fit in (arx, ar, fir, ss):
-        for name in set(options) - set(inspect.signature(_NormalEquations).parameters):
+        for name in sorted(set(options) - set(inspect.signature(_NormalEquations).parameters)):
             raise ValueError(f"{name}: the model is made in one pass over the experiments, which does not know it; leave it out")
         return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve(), stacklevel=3)
     work = _many.Work(read=dict(read or {}))

@@ -193,31 +193,26 @@ pub(crate) fn add_filtered(target: &mut [f64], weights: &[f64], x: &[f64]) {
 /// The sum of what values are above a base, with the bits of [`sum`]. 2 flops a value.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(crate) fn sum_above(values: &[f64], base: f64) -> f64 {
-    let (chunks, rest) = values.as_chunks::<LANES>();
-    let mut sum = [0.0; LANES];
-    for values in chunks {
-        for lane in 0..LANES {
-            sum[lane] += values[lane] - base;
-        }
-    }
-    sum.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value - base);
-    fold(sum)
+    sum_of(values, |value| value - base)
 }
 
 /// The sum of squares of what values are above a base, with the bits of [`sum`]. 3 flops a value.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub(crate) fn squares_above(values: &[f64], base: f64) -> f64 {
+    sum_of(values, |value| (value - base) * (value - base))
+}
+
+/// The sum of a term of each value, in the lanes of [`sum`].
+#[inline(always)]
+fn sum_of(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
     let (chunks, rest) = values.as_chunks::<LANES>();
     let mut sum = [0.0; LANES];
     for values in chunks {
         for lane in 0..LANES {
-            let above = values[lane] - base;
-            sum[lane] += above * above;
+            sum[lane] += term(values[lane]);
         }
     }
-    for (sum, value) in sum.iter_mut().zip(rest) {
-        *sum += (value - base) * (value - base);
-    }
+    sum.iter_mut().zip(rest).for_each(|(sum, value)| *sum += term(*value));
     fold(sum)
 }
 

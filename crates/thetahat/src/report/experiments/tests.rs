@@ -227,17 +227,23 @@ fn what_cannot_be_is_said() {
     assert!(Answer::from_bytes(&[]).is_err());
 }
 
+/// What is known of some experiments, and what those have who hold them.
+fn held(logs: &[Log], plan: &Plan) -> (Experiments, Vec<Log>) {
+    let mut all = Experiments::new(&logs[0], &[], plan).unwrap();
+    for log in &logs[1..] {
+        all.merge(&Experiments::new(log, &[], plan).unwrap()).unwrap();
+    }
+    let offsets = all.offsets(plan).unwrap();
+    let held: Vec<Log> =
+        logs.iter().map(|log| Experiments::deviations(log, plan, &offsets).unwrap()).collect();
+    (all, held)
+}
+
 #[test]
 fn a_holder_that_is_lost_in_the_middle_ends_it() {
     let logs: Vec<Log> = (0..3).map(|seed| log(seed, 90_000, 0.0)).collect();
     let plan = plan(Orders::oe(&[2], &[2], &[1]).unwrap());
-    let mut all = Experiments::new(&logs[0], &[], &plan).unwrap();
-    for log in &logs[1..] {
-        all.merge(&Experiments::new(log, &[], &plan).unwrap()).unwrap();
-    }
-    let offsets = all.offsets(&plan).unwrap();
-    let held: Vec<Log> =
-        logs.iter().map(|log| Experiments::deviations(log, &plan, &offsets).unwrap()).collect();
+    let (all, held) = held(&logs, &plan);
     let left = std::cell::Cell::new(5);
     let ask = |questions: &[Question]| {
         left.set(left.get() - 1);
@@ -266,13 +272,7 @@ fn a_failure_that_passes_is_no_model_of_less() {
     let logs: Vec<Log> = (0..3).map(|seed| log(seed, 88_000, 0.0)).collect();
     let plan = plan(Orders::oe(&[2], &[2], &[1]).unwrap());
     let plan = Plan { offsets: vec![("u".into(), 1.9)], ..plan };
-    let mut all = Experiments::new(&logs[0], &[], &plan).unwrap();
-    for log in &logs[1..] {
-        all.merge(&Experiments::new(log, &[], &plan).unwrap()).unwrap();
-    }
-    let offsets = all.offsets(&plan).unwrap();
-    let held: Vec<Log> =
-        logs.iter().map(|log| Experiments::deviations(log, &plan, &offsets).unwrap()).collect();
+    let (all, held) = held(&logs, &plan);
     let fit = |fails: usize| {
         let asked = std::cell::Cell::new(0);
         let ask = |questions: &[Question]| {

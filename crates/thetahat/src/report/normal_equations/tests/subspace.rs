@@ -1,6 +1,6 @@
 //! State-space models of a subspace method.
 
-use super::vector_arx::{difference, log, pieces};
+use super::vector_arx::{difference, log, pieces, with_gaps};
 use super::*;
 use crate::estimate::{Procedure, Refine, SubspaceOptions, SubspaceOutcome, Weighting};
 use crate::model::{Model, StateSpaceModel};
@@ -87,14 +87,8 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
 
 #[test]
 fn missing_values_gaps_and_experiments_are_what_they_are() {
-    let mut channels = log(1500, 3.0).channels().to_vec();
-    for (channel, row) in [(2, 299), (3, 330), (0, 345), (1, 700), (3, 704), (0, 1199), (2, 0), (3, 1499)] {
-        channels[channel].values[row] = f64::NAN;
-    }
-    // A clock that stops for a while, at a border and elsewhere.
-    let time =
-        |t: usize| 0.5 * t as f64 + if t >= 900 { 30.0 } else { 0.0 } + if t >= 1000 { 7.0 } else { 0.0 };
-    let values = Log::with_time(channels, (0..1500).map(time).collect()).unwrap();
+    let missing = [(2, 299), (3, 330), (0, 345), (1, 700), (3, 704), (0, 1199), (2, 0), (3, 1499)];
+    let values = with_gaps(&missing);
     let series = StateSpacePlan { inputs: Vec::new(), ..plan() };
     let late = StateSpacePlan { delays: vec![0, 5], ..plan() };
     for plan in [plan(), series, late] {

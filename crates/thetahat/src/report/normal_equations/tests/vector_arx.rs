@@ -106,16 +106,19 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
     }
 }
 
-#[test]
-fn missing_values_gaps_and_experiments_are_what_they_are() {
+/// A log that misses the values of these channels in these rows, on a clock that stops for a while, at a border and elsewhere.
+pub(super) fn with_gaps(missing: &[(usize, usize)]) -> Log {
     let mut channels = log(1500, 3.0).channels().to_vec();
-    for (channel, row) in [(2, 299), (3, 300), (0, 301), (1, 700), (3, 704), (0, 1199), (2, 0), (3, 1499)] {
-        channels[channel].values[row] = f64::NAN;
-    }
-    // A clock that stops for a while, at a border and elsewhere.
+    missing.iter().for_each(|(channel, row)| channels[*channel].values[*row] = f64::NAN);
     let time =
         |t: usize| 0.5 * t as f64 + if t >= 900 { 30.0 } else { 0.0 } + if t >= 1000 { 7.0 } else { 0.0 };
-    let values = Log::with_time(channels, (0..1500).map(time).collect()).unwrap();
+    Log::with_time(channels, (0..1500).map(time).collect()).unwrap()
+}
+
+#[test]
+fn missing_values_gaps_and_experiments_are_what_they_are() {
+    let missing = [(2, 299), (3, 300), (0, 301), (1, 700), (3, 704), (0, 1199), (2, 0), (3, 1499)];
+    let values = with_gaps(&missing);
     let series = StateSpacePlan { inputs: Vec::new(), ..plan() };
     let series_arx = VectorArxOptions { nb: VectorArxInputs::Alike(0..=0), ..plan().arx.unwrap() };
     for plan in [plan(), StateSpacePlan { arx: Some(series_arx), ..series }] {

@@ -7,7 +7,6 @@ use std::path::Path;
 use thetahat::text;
 
 use crate::options::{option_of, with_options};
-use crate::table;
 
 /// One line for a person, and an exit code for a script.
 #[derive(Debug)]
@@ -156,11 +155,11 @@ impl Failure {
     }
 }
 
-impl From<table::Error> for Failure {
-    fn from(error: table::Error) -> Self {
+impl From<thetahat_table::Error> for Failure {
+    fn from(error: thetahat_table::Error) -> Self {
         let kind = match error.kind() {
-            table::ErrorKind::Io => Kind::Io(io::ErrorKind::Other),
-            table::ErrorKind::Data => Kind::Data,
+            thetahat_table::ErrorKind::Io => Kind::Io(io::ErrorKind::Other),
+            thetahat_table::ErrorKind::Data => Kind::Data,
         };
         Self::new(kind, error.to_string())
     }

@@ -17,10 +17,10 @@ use indicatif::ProgressBar;
 use signal_hook::{consts::SIGTERM, iterator::Signals};
 use tempfile::NamedTempFile;
 use thetahat::Error;
+use thetahat_table::Waker;
 
 use crate::failure::Failure;
 use crate::messages::say;
-use crate::table::Waker;
 
 /// What a shell gives for a program that SIGINT ended, and for one that SIGTERM did.
 const INTERRUPTED: u8 = 130;

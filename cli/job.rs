@@ -30,7 +30,6 @@ use crate::args::{
 use crate::failure::Failure;
 use crate::line_writer::Format;
 use crate::memory::PerValue;
-use crate::table;
 
 pub(crate) use control::control_plan;
 pub(crate) use design::DesignJob;
@@ -49,7 +48,7 @@ pub(crate) use validate::EvaluationJob;
 /// How to read a log.
 #[derive(Debug)]
 pub(crate) struct LogJob {
-    pub(crate) options: table::Options,
+    pub(crate) options: thetahat_table::Options,
     pub(crate) clock: Clock,
     /// What is to be done with it takes so much memory.
     pub(crate) per_value: PerValue,
@@ -98,7 +97,7 @@ impl LogJob {
                 ))
             })
         });
-        let options = table::Options {
+        let options = thetahat_table::Options {
             delimiter: log.delimiter.as_deref().map(|text| byte("--delimiter", text)).transpose()?,
             decimal_comma: log.decimal_comma,
             header: !log.no_header,

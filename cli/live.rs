@@ -1,9 +1,10 @@
 //! What verbs that follow a log row by row have in common.
 
+use thetahat_table::{Event, Stream};
+
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::messages::warn;
-use crate::table::{Event, Stream};
 
 /// This many faults of a kind are told one by one.
 const TOLD: u64 = 5;
@@ -59,7 +60,7 @@ impl Live {
             return Ok(Next::Stopped);
         }
         self.is_blank = false;
-        let event = self.stream.next()?;
+        let event = self.stream.advance()?;
         self.stream.words().iter().for_each(|word| warn(word));
         match event {
             Event::Row => self.look_at_the_clock()?,

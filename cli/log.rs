@@ -1,18 +1,18 @@
 //! From a table to a log: which columns, which clock, and in which row an error is.
 
 use std::collections::{HashMap, HashSet};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use thetahat::data::{Channel, Log, Recording, Resampling, Rows, Source, Times};
 use thetahat::model::{GreyBox, Model};
 use thetahat::{Error, text};
+use thetahat_table::{Bound, Lines, Options, Reader, Selection, Stream, Table};
 
 use crate::failure::Failure;
 use crate::interrupt;
 use crate::job::{Clock, LogJob};
-use crate::memory::Bound;
 use crate::progress::Reading;
-use crate::table::{self, Lines, Reader, Selection, Stream, Table};
 
 /// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
@@ -197,7 +197,7 @@ pub(crate) fn in_parts<T>(
     let mut waiting: Option<Table> = None;
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
-    reader.read_parts(&selection, Some(most), &mut update, &mut |mut part: Table| {
+    let mut taken = |mut part: Table| -> Result<(), Failure> {
         for word in std::mem::take(&mut part.words) {
             if !words.contains(&word) {
                 words.push(word);
@@ -212,7 +212,18 @@ pub(crate) fn in_parts<T>(
             }
         }
         if interrupt::asked() { Err(Failure::interrupted()) } else { Ok(()) }
+    };
+    let mut failure = None;
+    reader.read_parts(&selection, Some(most), &mut update, &mut |part| match taken(part) {
+        Ok(()) => ControlFlow::Continue(()),
+        Err(error) => {
+            failure = Some(error);
+            ControlFlow::Break(())
+        }
     })?;
+    if let Some(failure) = failure {
+        return Err(failure);
+    }
     if let Some(last) = waiting {
         take(&chosen, before.with(last)?)?;
     }
@@ -356,8 +367,8 @@ fn columns(
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Columns, Failure> {
     // As much as there is now: other logs may be in memory already.
-    let bound = Some(Bound::now(job.per_value));
-    let reader = Reader::open(path, &table::Options { bound, ..job.options.clone() })?;
+    let bound = Some(Bound::now(job.per_value as u64));
+    let reader = Reader::open(path, &Options { bound, ..job.options.clone() })?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
     let (selection, mut words) = selected(&reader, &file, job, &names)?;

@@ -1,9 +1,9 @@
-//! What the library's arguments are called here.
+//! What the arguments of the libraries are called here.
 //!
-//! The library names them between backticks, as `detrend`, wherever one is advised; here they are options.
+//! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
-/// The arguments of the library that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 81] = [
+/// The arguments of the libraries that are options, by the name that both have.
+pub(crate) const OPTIONS: [&str; 89] = [
     "alarm",
     "alpha",
     "alphas",
@@ -11,14 +11,18 @@ pub(crate) const OPTIONS: [&str; 81] = [
     "cancel-zeros",
     "centres",
     "channels",
+    "comment",
     "constant",
     "couple",
     "dc-gain",
     "dead-zone",
+    "decimal-comma",
     "degree",
+    "delimiter",
     "detrend",
     "discard",
     "draws",
+    "encoding",
     "estimate",
     "estimator",
     "feedthrough",
@@ -39,10 +43,12 @@ pub(crate) const OPTIONS: [&str; 81] = [
     "measurement-noise",
     "method",
     "minimum-variance",
+    "missing",
     "most-terms",
     "name",
     "nf",
     "nk",
+    "no-header",
     "noise-bound",
     "norm",
     "nu",
@@ -68,12 +74,14 @@ pub(crate) const OPTIONS: [&str; 81] = [
     "scale",
     "select",
     "signal",
+    "skip-rows",
     "split",
     "start",
     "step",
     "term",
     "terms",
     "time",
+    "time-format",
     "time-limit",
     "to",
     "tolerance",
@@ -97,7 +105,7 @@ pub(crate) fn option_of(argument: &str) -> Option<&'static str> {
     }
 }
 
-/// A message of the library with its arguments as options: `detrend` mean is --detrend mean.
+/// A message of a library with its arguments as options: `detrend` mean is --detrend mean.
 pub fn with_options(message: &str) -> String {
     let mut parts = message.split('`');
     let mut text = parts.next().unwrap_or_default().to_owned();

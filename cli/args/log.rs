@@ -4,8 +4,6 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use crate::table;
-
 /// The clock of a log that is read as it comes.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Clock")]
@@ -29,7 +27,7 @@ impl FromStr for Names {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        table::names(text).map(Self)
+        thetahat_table::names(text).map(Self)
     }
 }
 

@@ -7,6 +7,7 @@ use thetahat::data::{Recording, Source, Times};
 use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
+use thetahat_table::Reader;
 
 use super::each::{Done, each};
 use super::experiments::usual_inputs;
@@ -16,7 +17,6 @@ use crate::failure::Failure;
 use crate::job::{Clock, InspectJob};
 use crate::log::{self, Recorded};
 use crate::output;
-use crate::table::Reader;
 use crate::wrap::{WIDTH, stdout_width};
 
 pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {

@@ -6,7 +6,6 @@ use super::{Clock, LogJob, only};
 use crate::args::{InspectArguments, Names};
 use crate::failure::Failure;
 use crate::shell::quoted;
-use crate::table;
 
 /// Delays that are tried where none was found, and at least.
 const LONGEST: usize = 20;
@@ -84,7 +83,7 @@ impl InspectJob {
         if inputs.is_empty() {
             option("--nb", "0");
         } else {
-            option("-u", &table::list(&inputs));
+            option("-u", &thetahat_table::list(&inputs));
         }
         option("-y", &output.name);
         if let (Some(rest), false) = (inspection.rest, inputs.is_empty()) {

@@ -10,6 +10,7 @@ mod values;
 #[cfg(test)]
 mod tests;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::mpsc::SyncSender;
 use std::thread;
@@ -27,7 +28,7 @@ use clock::Clock;
 use values::{Kind, numbers};
 
 /// A log in columns, whose names and types are known and whose rows are still to be read.
-pub(crate) struct ColumnarReader {
+pub(super) struct ColumnarReader {
     options: Options,
     columns: Columns,
     opened: Opened,
@@ -97,7 +98,7 @@ impl Columns {
                 }
                 Kind::Instants(..) | Kind::Durations(_) => {
                     return Err(self.error(format!(
-                        "{said} holds times ({kind}), which only the clock is; name it with --time"
+                        "{said} holds times ({kind}), which only the clock is; name it with `time`"
                     )));
                 }
                 Kind::Others => {
@@ -150,38 +151,42 @@ impl ColumnarReader {
     }
 
     /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
-    pub(super) fn read_parts<E: From<Error>>(
+    pub(super) fn read_parts(
         self,
         selection: &Selection,
         most: Option<usize>,
         progress: &mut dyn FnMut(u64, Option<u64>),
-        take: &mut dyn FnMut(Table) -> Result<(), E>,
-    ) -> Result<(), E> {
+        take: &mut dyn FnMut(Table) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
         let bound = self.options.bound;
         let rows = self.opened.rows();
         let mut conversion = self.conversion(selection, None)?;
         let too_large = |values: usize| bound.and_then(|bound| bound.passed_by(values));
         let width = conversion.fields.len();
         if let Some(words) = rows.and_then(|rows| too_large(rows.saturating_mul(width))) {
-            return Err(conversion.too_large(&words).into());
+            return Err(conversion.too_large(&words));
         }
         let room = most.or(rows).unwrap_or(0);
         let mut part = Part::new(width, room);
         while let Some(batch) = conversion.batch()? {
             conversion.append(&batch, &mut part)?;
             if let Some(fault) = part.first_fault() {
-                return Err(fault.into());
+                return Err(fault);
             }
             if let Some(words) = too_large(part.rows.saturating_mul(width)) {
-                return Err(conversion.too_large(&words).into());
+                return Err(conversion.too_large(&words));
             }
             let (read, total) = conversion.batches.progress();
             progress(read, total);
             if most.is_some_and(|most| part.rows >= most) {
-                take(conversion.table(std::mem::replace(&mut part, Part::new(width, room)), selection))?;
+                let whole = std::mem::replace(&mut part, Part::new(width, room));
+                if take(conversion.table(whole, selection)).is_break() {
+                    return Ok(());
+                }
             }
         }
-        take(conversion.table(part, selection))
+        let _ = take(conversion.table(part, selection));
+        Ok(())
     }
 
     /// Gives the rows of the selected columns one by one; see [`Reader::stream`](super::Reader::stream).
@@ -216,7 +221,7 @@ impl ColumnarReader {
             && let Some(time) = selection.time.filter(|&time| *columns.kind(time) != Kind::Texts)
         {
             let message = format!(
-                "{} holds {}, not texts, so --time-format says nothing of it; leave it out",
+                "{} holds {}, not texts, so `time-format` says nothing of it; leave it out",
                 columns.said(time),
                 columns.kind(time).said()
             );
@@ -247,13 +252,13 @@ impl ColumnarReader {
 /// The option of texts that was given, if there is one.
 fn text_option(options: &Options) -> Option<&'static str> {
     let given = [
-        ("--delimiter", options.delimiter.is_some()),
-        ("--decimal-comma", options.decimal_comma),
-        ("--no-header", !options.header),
-        ("--skip-rows", options.skip_rows > 0),
-        ("--comment", options.comment.is_some()),
-        ("--missing", !options.missing.is_empty()),
-        ("--encoding", options.encoding.is_some()),
+        ("`delimiter`", options.delimiter.is_some()),
+        ("`decimal-comma`", options.decimal_comma),
+        ("`no-header`", !options.header),
+        ("`skip-rows`", options.skip_rows > 0),
+        ("`comment`", options.comment.is_some()),
+        ("`missing`", !options.missing.is_empty()),
+        ("`encoding`", options.encoding.is_some()),
     ];
     given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
 }
@@ -394,7 +399,7 @@ impl Conversion {
 /// A log in columns of which the rows are read one after the other. Memory does not grow with their number.
 ///
 /// A thread of its own reads the batches.
-pub(crate) struct ColumnarStream {
+pub(super) struct ColumnarStream {
     /// Where each selected column is in a part, and where the time is.
     places: Vec<usize>,
     time: Option<usize>,

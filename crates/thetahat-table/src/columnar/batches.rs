@@ -84,7 +84,8 @@ impl Opened {
                 // A message begins with a few bytes each.
                 let bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());
                 let mut kept = Kept { bytes, copy: Vec::new() };
-                let schema = guarded(|| StreamReader::try_new(&mut kept, None).map(|reader| reader.schema()))
+                let stream: Box<dyn Read + Send + '_> = Box::new(&mut kept);
+                let schema = guarded(|| StreamReader::try_new(stream, None).map(|reader| reader.schema()))
                     .map_err(|error| damaged(&name, 0, &error))?;
                 let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
                 Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
@@ -94,7 +95,7 @@ impl Opened {
 
     fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
         let (file, length) = opened(path, &name)?;
-        let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(&file), None)?.schema()))
+        let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(file.try_clone()?), None)?.schema()))
             .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
         Ok((Self::File { name, file, length }, schema))
     }

@@ -61,7 +61,7 @@ impl Layout {
         if starts_with_number(content) {
             return self.fault(row, field, message);
         }
-        let message = format!("{message}; if this row holds units, leave it out with --skip-rows");
+        let message = format!("{message}; if this row holds units, leave it out with `skip-rows`");
         self.fault(row, field, &message)
     }
 
@@ -71,12 +71,12 @@ impl Layout {
         let first = self.names.first().map_or("", String::as_str);
         let advice = if self.dialect.delimiter == b',' && found == 2 * width {
             if width == 1 {
-                "if it has a decimal comma, say --decimal-comma"
+                "if it has a decimal comma, say `decimal-comma`"
             } else {
-                "if it has decimal commas, separate its fields by semicolons and say --decimal-comma"
+                "if it has decimal commas, separate its fields by semicolons and say `decimal-comma`"
             }
         } else if first.starts_with(['#', '%', '/']) && width < found {
-            "if the first line is a comment, say --comment and its first character"
+            "if the first line is a comment, say `comment` and its first character"
         } else if found > width && row.record.field(found - 1).trim_ascii().is_empty() {
             "take the delimiter at its end away, or name one column more"
         } else if found > width {

@@ -22,7 +22,7 @@ const LONGEST: usize = 1 << 24;
 ///
 /// A thread of its own reads the text, so that a row is parsed as soon as its line break is there. Every line is a row:
 /// a quoted field does not reach beyond it.
-pub(crate) struct TextStream {
+pub(super) struct TextStream {
     plan: Plan,
     record: Record,
     /// The values of the row at hand by ascending field, and in the order of the selection.
@@ -88,32 +88,32 @@ impl TextStream {
     }
 
     /// What ends this stream early.
-    pub(crate) fn waker(&self) -> Waker {
+    pub(super) fn waker(&self) -> Waker {
         self.mailbox.waker()
     }
 
     /// The time that dates count from, as it is written; none if times are numbers.
-    pub(crate) fn start(&self) -> Option<&str> {
+    pub(super) fn start(&self) -> Option<&str> {
         self.start.as_deref()
     }
 
     /// The row at hand, in the order of the selection; NaN is a missing value.
-    pub(crate) fn values(&self) -> &[f64] {
+    pub(super) fn values(&self) -> &[f64] {
         &self.values
     }
 
     /// The time of the row at hand in seconds, as [`Table::time`](super::Table).
-    pub(crate) fn time(&self) -> Option<f64> {
+    pub(super) fn time(&self) -> Option<f64> {
         self.fields.get(self.time?).copied()
     }
 
     /// The line on which the row at hand is, or the malformed one.
-    pub(crate) fn line(&self) -> u64 {
+    pub(super) fn line(&self) -> u64 {
         self.line
     }
 
     /// Whether the log ended inside a line, which was left alone.
-    pub(crate) fn is_unfinished(&self) -> bool {
+    pub(super) fn is_unfinished(&self) -> bool {
         self.ended && self.position < self.text.len()
     }
 
@@ -121,7 +121,7 @@ impl TextStream {
     ///
     /// # Errors
     /// That the text cannot be read, or has a line of more than 16 MiB. What was read before is told first.
-    pub(crate) fn next(&mut self) -> Result<Event, Error> {
+    pub(super) fn next(&mut self) -> Result<Event, Error> {
         loop {
             if let Some(event) = self.parse()? {
                 self.mailbox.forget();

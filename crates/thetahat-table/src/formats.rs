@@ -1,5 +1,6 @@
 //! Logs of all formats, behind one front.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::error::Error;
@@ -13,7 +14,9 @@ use super::{Options, Selection, Table};
 use super::columnar::{ColumnarReader, ColumnarStream};
 
 /// A log whose columns are known and whose rows are still to be read.
-pub(crate) enum Reader {
+pub struct Reader(pub(super) AnyReader);
+
+pub(super) enum AnyReader {
     Text(Box<TextReader>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarReader>),
@@ -21,13 +24,13 @@ pub(crate) enum Reader {
 
 impl Reader {
     /// Opens a log, or standard input for `-`, and reads as far as its first row.
-    pub(crate) fn open(path: &Path, options: &Options) -> Result<Self, Error> {
+    pub fn open(path: &Path, options: &Options) -> Result<Self, Error> {
         Self::begin(path, options, |source| TextReader::start(source, options, SIZES))
     }
 
     /// Opens a log as [`open`](Reader::open) does, without asking for more than it takes to know its columns: it may be
     /// a pipe on which the next row is yet to come. For [`stream`](Reader::stream).
-    pub(crate) fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
+    pub fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
         Self::begin(path, options, |source| TextReader::start_live(source, options))
     }
 
@@ -39,9 +42,11 @@ impl Reader {
         options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
         let bytes = Bytes::open(path)?;
         match bytes.format {
-            None => Ok(Self::Text(Box::new(text(Source::new(bytes, options.encoding))?))),
+            None => Ok(Self(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?)))),
             #[cfg(feature = "columnar")]
-            Some(format) => Ok(Self::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?))),
+            Some(format) => {
+                Ok(Self(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?))))
+            }
             #[cfg(not(feature = "columnar"))]
             Some(_) => Err(Error::data(
                 bytes.name(),
@@ -53,39 +58,39 @@ impl Reader {
     }
 
     /// The names of the columns, as they are in the header; without one they are numbered from `1`.
-    pub(crate) fn names(&self) -> &[String] {
-        match self {
-            Self::Text(reader) => reader.names(),
+    pub fn names(&self) -> &[String] {
+        match &self.0 {
+            AnyReader::Text(reader) => reader.names(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.names(),
+            AnyReader::Columnar(reader) => reader.names(),
         }
     }
 
     /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
     /// is a number, and not all are missing.
-    pub(crate) fn words(&self) -> Vec<bool> {
-        match self {
-            Self::Text(reader) => reader.words(),
+    pub fn words(&self) -> Vec<bool> {
+        match &self.0 {
+            AnyReader::Text(reader) => reader.words(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.words(),
+            AnyReader::Columnar(reader) => reader.words(),
         }
     }
 
     /// The columns of which the name is not UTF-8 and cannot be shown.
-    pub(crate) fn nameless(&self) -> Vec<usize> {
-        match self {
-            Self::Text(reader) => reader.nameless().collect(),
+    pub fn nameless(&self) -> Vec<usize> {
+        match &self.0 {
+            AnyReader::Text(reader) => reader.nameless().collect(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(_) => Vec::new(),
+            AnyReader::Columnar(_) => Vec::new(),
         }
     }
 
     /// The columns that are times by their type; a text says of none.
-    pub(crate) fn times(&self) -> Vec<usize> {
-        match self {
-            Self::Text(_) => Vec::new(),
+    pub fn times(&self) -> Vec<usize> {
+        match &self.0 {
+            AnyReader::Text(_) => Vec::new(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.times(),
+            AnyReader::Columnar(reader) => reader.times(),
         }
     }
 
@@ -93,7 +98,7 @@ impl Reader {
     ///
     /// `progress` is called once a block with the number of bytes read so far, and of how many if that is
     /// known. Both count what is stored, before it is unpacked.
-    pub(crate) fn read(
+    pub fn read(
         self,
         selection: &Selection,
         progress: &mut dyn FnMut(u64, Option<u64>),
@@ -101,46 +106,52 @@ impl Reader {
         let mut whole = Table::default();
         self.read_parts(selection, None, progress, &mut |table| {
             whole = table;
-            Ok::<(), Error>(())
+            ControlFlow::Continue(())
         })?;
         Ok(whole)
     }
 
     /// The same in parts, each with `most` rows or a little more, the last one with what is left: memory does not grow with the
     /// rows. None: all in one.
-    pub(crate) fn read_parts<E: From<Error>>(
+    pub fn read_parts(
         self,
         selection: &Selection,
         most: Option<usize>,
         progress: &mut dyn FnMut(u64, Option<u64>),
-        take: &mut dyn FnMut(Table) -> Result<(), E>,
-    ) -> Result<(), E> {
-        match self {
-            Self::Text(reader) => reader.read_parts(selection, most, progress, take),
+        take: &mut dyn FnMut(Table) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        match self.0 {
+            AnyReader::Text(reader) => reader.read_parts(selection, most, progress, take),
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => reader.read_parts(selection, most, progress, take),
+            AnyReader::Columnar(reader) => reader.read_parts(selection, most, progress, take),
         }
     }
 
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
     /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
     /// from the first one.
-    pub(crate) fn stream(
+    pub fn stream(
         self,
         selection: &Selection,
         whole_lines: bool,
         start: Option<&str>,
     ) -> Result<Stream, Error> {
-        match self {
-            Self::Text(reader) => Ok(Stream::Text(Box::new(reader.stream(selection, whole_lines, start)?))),
+        match self.0 {
+            AnyReader::Text(reader) => {
+                Ok(Stream(AnyStream::Text(Box::new(reader.stream(selection, whole_lines, start)?))))
+            }
             #[cfg(feature = "columnar")]
-            Self::Columnar(reader) => Ok(Stream::Columnar(Box::new(reader.stream(selection, start)?))),
+            AnyReader::Columnar(reader) => {
+                Ok(Stream(AnyStream::Columnar(Box::new(reader.stream(selection, start)?))))
+            }
         }
     }
 }
 
 /// A log of which the rows are read one after the other. Memory does not grow with their number.
-pub(crate) enum Stream {
+pub struct Stream(AnyStream);
+
+enum AnyStream {
     Text(Box<TextStream>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarStream>),
@@ -148,65 +159,65 @@ pub(crate) enum Stream {
 
 impl Stream {
     /// What ends this stream early.
-    pub(crate) fn waker(&self) -> Waker {
-        match self {
-            Self::Text(stream) => stream.waker(),
+    pub fn waker(&self) -> Waker {
+        match &self.0 {
+            AnyStream::Text(stream) => stream.waker(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.waker(),
+            AnyStream::Columnar(stream) => stream.waker(),
         }
     }
 
     /// The time that dates count from, as it is written; none if times are numbers.
-    pub(crate) fn start(&self) -> Option<&str> {
-        match self {
-            Self::Text(stream) => stream.start(),
+    pub fn start(&self) -> Option<&str> {
+        match &self.0 {
+            AnyStream::Text(stream) => stream.start(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.start(),
+            AnyStream::Columnar(stream) => stream.start(),
         }
     }
 
     /// The row at hand, in the order of the selection; NaN is a missing value.
-    pub(crate) fn values(&self) -> &[f64] {
-        match self {
-            Self::Text(stream) => stream.values(),
+    pub fn values(&self) -> &[f64] {
+        match &self.0 {
+            AnyStream::Text(stream) => stream.values(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.values(),
+            AnyStream::Columnar(stream) => stream.values(),
         }
     }
 
     /// The time of the row at hand in seconds, as [`Table::time`].
-    pub(crate) fn time(&self) -> Option<f64> {
-        match self {
-            Self::Text(stream) => stream.time(),
+    pub fn time(&self) -> Option<f64> {
+        match &self.0 {
+            AnyStream::Text(stream) => stream.time(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.time(),
+            AnyStream::Columnar(stream) => stream.time(),
         }
     }
 
     /// The row at hand, or the malformed one, as messages name it.
-    pub(crate) fn place(&self, file: &str) -> String {
-        match self {
-            Self::Text(stream) => format!("{file}:{}", stream.line()),
+    pub fn place(&self, file: &str) -> String {
+        match &self.0 {
+            AnyStream::Text(stream) => format!("{file}:{}", stream.line()),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => format!("{file}: row {}", stream.row()),
+            AnyStream::Columnar(stream) => format!("{file}: row {}", stream.row()),
         }
     }
 
     /// Whether the log ended inside a line, which was left alone.
-    pub(crate) fn is_unfinished(&self) -> bool {
-        match self {
-            Self::Text(stream) => stream.is_unfinished(),
+    pub fn is_unfinished(&self) -> bool {
+        match &self.0 {
+            AnyStream::Text(stream) => stream.is_unfinished(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(_) => false,
+            AnyStream::Columnar(_) => false,
         }
     }
 
     /// What the reader should know, in plain words, each once.
-    pub(crate) fn words(&mut self) -> Vec<String> {
-        match self {
-            Self::Text(_) => Vec::new(),
+    pub fn words(&mut self) -> Vec<String> {
+        match &mut self.0 {
+            AnyStream::Text(_) => Vec::new(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.words(),
+            AnyStream::Columnar(stream) => stream.words(),
         }
     }
 
@@ -214,11 +225,11 @@ impl Stream {
     ///
     /// # Errors
     /// That the log cannot be read, or a text has a line of more than 16 MiB. What was read before is told first.
-    pub(crate) fn next(&mut self) -> Result<Event, Error> {
-        match self {
-            Self::Text(stream) => stream.next(),
+    pub fn advance(&mut self) -> Result<Event, Error> {
+        match &mut self.0 {
+            AnyStream::Text(stream) => stream.next(),
             #[cfg(feature = "columnar")]
-            Self::Columnar(stream) => stream.next(),
+            AnyStream::Columnar(stream) => stream.next(),
         }
     }
 }

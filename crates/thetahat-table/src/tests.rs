@@ -7,6 +7,7 @@ use encoding_rs::{Encoding, UTF_16LE, WINDOWS_1252};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
+use super::formats::AnyReader;
 use super::reader::{SIZES, Sizes, TextReader};
 use super::source::{Bytes, Source};
 use super::*;
@@ -20,7 +21,7 @@ const TINY: [(usize, usize); 6] = [(1, 1), (2, 1), (7, 3), (16, 5), (64, 16), (1
 impl TextReader {
     /// Behind the front of all formats.
     fn read(self, selection: &Selection, progress: &mut dyn FnMut(u64, Option<u64>)) -> Result<Table, Error> {
-        Reader::Text(Box::new(self)).read(selection, progress)
+        Reader(AnyReader::Text(Box::new(self))).read(selection, progress)
     }
 }
 
@@ -182,22 +183,22 @@ fn decimal_commas() {
     assert_eq!(columns("u\ty\n1,5\t\"2,5\"\n", &options), [[1.5], [2.5]]);
     assert_eq!(
         error("u;y\n1.5;2\n", &options),
-        "log.csv:2:1: column 'u': \"1.5\" has a decimal point, yet --decimal-comma was given; correct it, or leave that \
+        "log.csv:2:1: column 'u': \"1.5\" has a decimal point, yet `decimal-comma` was given; correct it, or leave that \
          option out"
     );
     assert_eq!(
         error("u;y\n1;2,5\n", &plain()),
-        "log.csv:2:3: column 'y': \"2,5\" is not a number; if it has a decimal comma, say --decimal-comma"
+        "log.csv:2:3: column 'y': \"2,5\" is not a number; if it has a decimal comma, say `decimal-comma`"
     );
     assert_eq!(
         error("y\n1,5\n2,5\n", &plain()),
         "log.csv:2:3: this row has 2 fields, but there is 1 column (\",\" separates them); if it has a decimal comma, \
-         say --decimal-comma"
+         say `decimal-comma`"
     );
     assert_eq!(
         error("u,y\n1,5,2,5\n1,5,2,5\n", &plain()),
         "log.csv:2:5: this row has 4 fields, but there are 2 columns (\",\" separates them); if it has decimal \
-         commas, separate its fields by semicolons and say --decimal-comma"
+         commas, separate its fields by semicolons and say `decimal-comma`"
     );
 }
 
@@ -216,38 +217,38 @@ fn values_that_are_no_numbers() {
     for (text, message) in [
         (
             "u,y\n1,2\n3,abc\n",
-            "log.csv:3:3: column 'y': \"abc\" is not a number; correct it, or name it with --missing abc if it stands \
+            "log.csv:3:3: column 'y': \"abc\" is not a number; correct it, or name it with `missing` abc if it stands \
              for a missing value",
         ),
         (
             "u,y\nV,°C\n1,2\n",
-            "log.csv:2:1: column 'u': \"V\" is not a number; correct it, or name it with --missing V if it stands for \
-             a missing value; if this row holds units, leave it out with --skip-rows",
+            "log.csv:2:1: column 'u': \"V\" is not a number; correct it, or name it with `missing` V if it stands for \
+             a missing value; if this row holds units, leave it out with `skip-rows`",
         ),
         (
             "µ,y\n1,2\n\"é\né\", inf\n",
-            "log.csv:3:1: column 'µ': \"é\\né\" is not a number; correct it, or declare it with --missing if it stands \
+            "log.csv:3:1: column 'µ': \"é\\né\" is not a number; correct it, or declare it with `missing` if it stands \
              for a missing value",
         ),
         (
             "u,\n1,2\n\"3\",  -1e400\n",
-            "log.csv:3:7: column 2: \"-1e400\" is infinite; correct it, or name it with --missing='-1e400' if it \
+            "log.csv:3:7: column 2: \"-1e400\" is infinite; correct it, or name it with `missing`='-1e400' if it \
              stands for a missing value",
         ),
         (
             "u,y\n1 2,3\n",
-            "log.csv:2:1: column 'u': \"1 2\" is not one number; say --delimiter ' ' if one blank separates two \
+            "log.csv:2:1: column 'u': \"1 2\" is not one number; say `delimiter` ' ' if one blank separates two \
              fields, and put one in place of several",
         ),
         (
             "y\n1\r2\r3\n",
-            "log.csv:2:1: column 'y': \"1\\r2\\r3\" is not one number; say --delimiter ' ' if one blank \
+            "log.csv:2:1: column 'y': \"1\\r2\\r3\" is not one number; say `delimiter` ' ' if one blank \
              separates two fields, and put one in place of several",
         ),
     ] {
         assert_eq!(error(text, &plain()), message, "{text:?}");
     }
-    assert!(error(b"y\n\xb0C\n", &plain()).contains("--encoding windows-1252"));
+    assert!(error(b"y\n\xb0C\n", &plain()).contains("`encoding` windows-1252"));
     assert!(error(format!("y\n1\n{}\n", "x".repeat(1000)), &plain()).len() < 200);
 }
 
@@ -285,7 +286,7 @@ fn ragged_rows() {
         (
             "# by x\na,b,c\n1,2,3\n",
             "log.csv:2:3: this row has 3 fields, but there is 1 column (\",\" separates them); if the first line is a \
-             comment, say --comment and its first character",
+             comment, say `comment` and its first character",
         ),
     ] {
         assert_eq!(error(text, &plain()), message, "{text:?}");
@@ -319,7 +320,7 @@ fn nothing_to_read() {
 fn what_is_no_text_table() {
     assert_eq!(
         error(b"\x7fELF\n\x00\x01", &plain()),
-        "log.csv:2:1: a NUL byte: this is no text table; name a text file, or say --encoding utf-16le if it is UTF-16"
+        "log.csv:2:1: a NUL byte: this is no text table; name a text file, or say `encoding` utf-16le if it is UTF-16"
     );
     assert!(error(b"u\x00,\x00y\x00\n\x00", &plain()).contains("utf-16le"));
     // A NUL byte that turns up after the first block.
@@ -418,7 +419,7 @@ fn a_name_that_is_not_utf8_matters_if_its_column_is_used() {
     assert_eq!(open().read(&select(0), &mut |_, _| {}).unwrap().rows, 1);
     assert_eq!(
         open().read(&select(1), &mut |_, _| {}).unwrap_err().to_string(),
-        "log.csv:1:3: column 2: its name \"T \\xb0C\" is not UTF-8; name the file's encoding, as in --encoding \
+        "log.csv:1:3: column 2: its name \"T \\xb0C\" is not UTF-8; name the file's encoding, as in `encoding` \
          windows-1252"
     );
 }
@@ -455,8 +456,8 @@ fn times() {
         "log.csv:3:1: column 't': \"2024-03-01\" is a date, but the first time is a number; write all times alike"
     );
     assert!(error("t,y\n2024-03-01,1\n5,2\n").starts_with("log.csv:3:1: column 't': \"5\" is not a date"));
-    assert!(error("t,y\ns,V\n1,2\n").ends_with("if this row holds units, leave it out with --skip-rows"));
-    assert!(error("t,y\n12:00,1\n").contains("--time-format"));
+    assert!(error("t,y\ns,V\n1,2\n").ends_with("if this row holds units, leave it out with `skip-rows`"));
+    assert!(error("t,y\n12:00,1\n").contains("`time-format`"));
     assert!(error("t,y\n,1\n").contains("the time is missing"));
     // A ragged first row is that in the first place.
     assert!(error("t,y\nx\n1,2\n").starts_with("log.csv:2:2: this row has 1 field"));

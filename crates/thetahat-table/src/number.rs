@@ -12,7 +12,7 @@ const MISSING: [&[u8]; 5] = [b"nan", b"-nan", b"na", b"n/a", b"null"];
 
 /// What a NUL byte in a log means.
 pub(super) const NUL_BYTE: &str =
-    "a NUL byte: this is no text table; name a text file, or say --encoding utf-16le if it is UTF-16";
+    "a NUL byte: this is no text table; name a text file, or say `encoding` utf-16le if it is UTF-16";
 
 /// How numbers are written in a log.
 #[derive(Clone, Debug)]
@@ -99,7 +99,7 @@ impl Numbers {
         } else if std::str::from_utf8(field).is_err() {
             format!(
                 "{shown} is neither a number nor UTF-8; correct it, or name the file's encoding, as in \
-                 --encoding windows-1252"
+                 `encoding` windows-1252"
             )
         } else if field.starts_with(b"\"") {
             format!("{shown} is not a number; take away the blanks in front of the quote, or the quote")
@@ -107,14 +107,14 @@ impl Numbers {
             format!("{shown} is infinite; correct it, or {missing}")
         } else if self.decimal_comma && parsed(field).is_some() {
             format!(
-                "{shown} has a decimal point, yet --decimal-comma was given; correct it, or leave that option \
+                "{shown} has a decimal point, yet `decimal-comma` was given; correct it, or leave that option \
                  out"
             )
         } else if parsed_with_comma(field).is_some_and(f64::is_finite) {
-            format!("{shown} is not a number; if it has a decimal comma, say --decimal-comma")
+            format!("{shown} is not a number; if it has a decimal comma, say `decimal-comma`")
         } else if field.split(u8::is_ascii_whitespace).filter_map(|part| self.finite(part)).nth(1).is_some() {
             format!(
-                "{shown} is not one number; say --delimiter ' ' if one blank separates two fields, and put one \
+                "{shown} is not one number; say `delimiter` ' ' if one blank separates two fields, and put one \
                  in place of several"
             )
         } else {
@@ -156,11 +156,11 @@ fn missing_advice(field: &[u8]) -> String {
     let plain = |byte: &u8| byte.is_ascii_alphanumeric() || b"._+-/%".contains(byte);
     let word = String::from_utf8_lossy(field);
     if shortened(&word) != word || !field.iter().all(|byte| plain(byte) || *byte == b' ') {
-        "declare it with --missing if it stands for a missing value".to_owned()
+        "declare it with `missing` if it stands for a missing value".to_owned()
     } else if field.iter().all(plain) && !field.starts_with(b"-") {
-        format!("name it with --missing {word} if it stands for a missing value")
+        format!("name it with `missing` {word} if it stands for a missing value")
     } else {
-        format!("name it with --missing='{word}' if it stands for a missing value")
+        format!("name it with `missing`='{word}' if it stands for a missing value")
     }
 }
 
@@ -232,7 +232,7 @@ mod tests {
         assert!(numbers.read(b"1.5").is_err_and(|message| message.contains("decimal point")));
         assert!(numbers.read(b"1.234,5").is_err());
         assert!(numbers.read(b"1,2,3").is_err());
-        assert!(read("1,5").is_err_and(|message| message.contains("--decimal-comma")));
+        assert!(read("1,5").is_err_and(|message| message.contains("`decimal-comma`")));
     }
 
     #[test]
@@ -256,13 +256,13 @@ mod tests {
             let message = Numbers::new(false, &[]).read(field).err().unwrap_or_default();
             assert!(message.contains(end), "{end}: {message}");
         };
-        ends(b"abc", "name it with --missing abc if");
-        ends(b"-x", "name it with --missing='-x' if");
-        ends(b"no data", "name it with --missing='no data' if");
-        ends(b"it's", "declare it with --missing if");
-        ends(&[b'x'; 99], "declare it with --missing if");
-        ends(b"1.5  2.5", "--delimiter ' '");
-        ends(b"\xb0C", "--encoding windows-1252");
+        ends(b"abc", "name it with `missing` abc if");
+        ends(b"-x", "name it with `missing`='-x' if");
+        ends(b"no data", "name it with `missing`='no data' if");
+        ends(b"it's", "declare it with `missing` if");
+        ends(&[b'x'; 99], "declare it with `missing` if");
+        ends(b"1.5  2.5", "`delimiter` ' '");
+        ends(b"\xb0C", "`encoding` windows-1252");
         ends(b"1\x00", "NUL byte");
     }
 }

@@ -14,7 +14,7 @@ use parquet::basic::{BrotliLevel, Compression, GzipLevel, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 use tempfile::TempDir;
 
-use crate::table::{Error, Event, Options, Reader, Selection, Table};
+use crate::{Error, Event, Options, Reader, Selection, Table};
 
 /// The formats by the ending of a file's name.
 const FORMATS: [&str; 3] = ["parquet", "arrow", "arrows"];
@@ -199,7 +199,7 @@ fn batches_and_row_groups_follow_one_another() {
         let mut stream = reader.stream(&selection, false, None).unwrap();
         let mut rows = 0;
         loop {
-            match stream.next().unwrap() {
+            match stream.advance().unwrap() {
                 Event::Row => {
                     assert_eq!(
                         (stream.values(), stream.time()),
@@ -286,7 +286,7 @@ fn times_have_units_and_zones() {
             let selection = selection(&reader, &["y"], Some("when"));
             let mut stream = reader.stream(&selection, true, start).unwrap();
             assert_eq!(stream.start(), start);
-            while !matches!(stream.next().unwrap(), Event::Row) {}
+            while !matches!(stream.advance().unwrap(), Event::Row) {}
             assert_eq!(stream.time(), Some(time[0]), "{format} {kind}");
         }
     }
@@ -336,7 +336,7 @@ fn a_wrong_value_is_told_with_its_row() {
         let mut stream = reader.stream(&selection, false, None).unwrap();
         let mut events = Vec::new();
         loop {
-            match stream.next().unwrap() {
+            match stream.advance().unwrap() {
                 Event::Row => events.push(format!("{:?}", stream.values())),
                 Event::Malformed(error) => {
                     events.push(error.to_string().split_once("/log: ").unwrap().1.to_owned())
@@ -374,7 +374,7 @@ fn columns_that_hold_no_numbers_are_known_and_refused() {
             ("pair", "column 'pair' is of the type Struct"),
             ("raw", "column 'raw' is of the type Binary"),
             ("word", "column 'word' holds texts (Utf8), not numbers; write it as a column of numbers"),
-            ("when", "which only the clock is; name it with --time"),
+            ("when", "which only the clock is; name it with `time`"),
         ] {
             let message = error(&bytes, &[column], None);
             assert!(message.contains(expected), "{message}");
@@ -392,14 +392,14 @@ fn options_of_texts_are_refused() {
     let table = batch(&[("t", numbers([0.0])), ("y", numbers([1.0]))]);
     let bytes = bytes("parquet", &[table]);
     for (options, option) in [
-        (Options { delimiter: Some(b';'), ..Options::default() }, "--delimiter"),
-        (Options { decimal_comma: true, ..Options::default() }, "--decimal-comma"),
-        (Options { header: false, ..Options::default() }, "--no-header"),
-        (Options { skip_rows: 1, ..Options::default() }, "--skip-rows"),
-        (Options { comment: Some(b'#'), ..Options::default() }, "--comment"),
-        (Options { missing: vec!["-9".to_owned()], ..Options::default() }, "--missing"),
-        (Options { encoding: Some(encoding_rs::WINDOWS_1252), ..Options::default() }, "--encoding"),
-        (Options { time_format: Some("%Y".to_owned()), ..Options::default() }, "--time-format"),
+        (Options { delimiter: Some(b';'), ..Options::default() }, "`delimiter`"),
+        (Options { decimal_comma: true, ..Options::default() }, "`decimal-comma`"),
+        (Options { header: false, ..Options::default() }, "`no-header`"),
+        (Options { skip_rows: 1, ..Options::default() }, "`skip-rows`"),
+        (Options { comment: Some(b'#'), ..Options::default() }, "`comment`"),
+        (Options { missing: vec!["-9".to_owned()], ..Options::default() }, "`missing`"),
+        (Options { encoding: Some(encoding_rs::WINDOWS_1252), ..Options::default() }, "`encoding`"),
+        (Options { time_format: Some("%Y".to_owned()), ..Options::default() }, "`time-format`"),
     ] {
         let message = read(&bytes, &["y"], Some("t"), &options).map(drop).unwrap_err().to_string();
         assert!(message.contains(option) && message.contains("leave it out"), "{message}");

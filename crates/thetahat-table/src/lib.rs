@@ -2,14 +2,40 @@
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
 //! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks
-//! of a mebibyte, the others batch by batch. [`Reader::open_live`] and [`Reader::stream`] give the rows one by one as they come.
+//! of a mebibyte, the others batch by batch. [`Reader::read_parts`] gives a log in parts, [`Reader::open_live`] and
+//! [`Reader::stream`] the rows one by one as they come.
+//!
+//! ```
+//! use thetahat_table::{Options, Reader, Selection};
+//!
+//! let path = std::env::temp_dir().join(format!("thetahat-table-{}.csv", std::process::id()));
+//! std::fs::write(&path, "t;u;y\n0;1,5;2\n1;;3\n")?;
+//! // The delimiter is recognised; what cannot be is said.
+//! let reader = Reader::open(&path, &Options { decimal_comma: true, ..Options::default() })?;
+//! assert_eq!(reader.names(), ["t", "u", "y"]);
+//!
+//! let selection = Selection { columns: vec![1, 2], time: Some(0) };
+//! let table = reader.read(&selection, &mut |_bytes, _of| {})?;
+//! assert_eq!(table.time, Some(vec![0.0, 1.0]));
+//! assert_eq!(table.columns[1], [2.0, 3.0]);
+//! assert!(table.columns[0][1].is_nan()); // a missing value
+//! # std::fs::remove_file(&path)?;
+//!
+//! // Errors say where: file, line and column.
+//! let error = Reader::open(std::path::Path::new("nowhere.csv"), &Options::default()).err();
+//! assert!(error.is_some_and(|error| error.to_string().starts_with("nowhere.csv: cannot be opened")));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! What is understood of texts: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
 //! lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
 //! as seconds, as ISO 8601 or in a given format.
 //!
+//! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call it:
+//! `decimal-comma`.
+//!
 //! What is not done here: the order of the times is not checked, names may repeat, and runs of blanks do not
-//! separate fields.
+//! separate fields. The crate knows nothing of models, nor of terminals.
 
 mod block;
 #[cfg(feature = "columnar")]
@@ -21,6 +47,7 @@ mod formats;
 mod layout;
 mod lines;
 mod mailbox;
+mod memory;
 mod names;
 mod number;
 mod reader;
@@ -32,36 +59,35 @@ mod stream;
 mod tests;
 mod time;
 
-use crate::memory::Bound;
-
-pub(crate) use error::{Error, ErrorKind};
-pub(crate) use formats::{Reader, Stream};
-pub(crate) use lines::Lines;
-pub(crate) use mailbox::{Event, Waker};
-pub(crate) use names::{list, names};
+pub use error::{Error, ErrorKind};
+pub use formats::{Reader, Stream};
+pub use lines::Lines;
+pub use mailbox::{Event, Waker};
+pub use memory::Bound;
+pub use names::{list, names};
 
 /// How a log is written, as far as it is not recognised by itself.
 #[derive(Clone, Debug)]
-pub(crate) struct Options {
+pub struct Options {
     /// The byte between two fields; recognised from the first rows if it is not given.
-    pub(crate) delimiter: Option<u8>,
+    pub delimiter: Option<u8>,
     /// Whether numbers are written with a decimal comma.
-    pub(crate) decimal_comma: bool,
+    pub decimal_comma: bool,
     /// Whether the first row names the columns. Without a header they are named `1`, `2`, and so on.
-    pub(crate) header: bool,
+    pub header: bool,
     /// How many rows below the header are left out: units, for example.
-    pub(crate) skip_rows: usize,
+    pub skip_rows: usize,
     /// The first character of a line that is a comment.
-    pub(crate) comment: Option<u8>,
+    pub comment: Option<u8>,
     /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`. Case does
     /// not matter, and a number stands for all ways to write it.
-    pub(crate) missing: Vec<String>,
+    pub missing: Vec<String>,
     /// The encoding of the text, if it is neither UTF-8 nor marked as UTF-16.
-    pub(crate) encoding: Option<&'static encoding_rs::Encoding>,
+    pub encoding: Option<&'static encoding_rs::Encoding>,
     /// How times are written, in the manner of strptime, if they are neither seconds nor ISO 8601.
-    pub(crate) time_format: Option<String>,
+    pub time_format: Option<String>,
     /// What memory there is for; times count as values, too.
-    pub(crate) bound: Option<Bound>,
+    pub bound: Option<Bound>,
 }
 
 impl Default for Options {
@@ -82,7 +108,7 @@ impl Default for Options {
 
 impl Options {
     /// Whether the options go together; if not, a message says which do not.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), String> {
         // These bytes are part of numbers, words, quotes and line ends.
         let unusable =
             |byte: u8| !byte.is_ascii() || byte.is_ascii_alphanumeric() || b"+-.\"\r\n\0".contains(&byte);
@@ -109,16 +135,16 @@ impl Options {
 
 /// Which columns to read, by their indices, each at most once.
 #[derive(Clone, Debug, Default, Eq, PartialEq)]
-pub(crate) struct Selection {
+pub struct Selection {
     /// The columns of numbers, in the order in which they are wanted.
-    pub(crate) columns: Vec<usize>,
+    pub columns: Vec<usize>,
     /// The column of times.
-    pub(crate) time: Option<usize>,
+    pub time: Option<usize>,
 }
 
 impl Table {
     /// Appends the part of the same file that follows.
-    pub(crate) fn extend(&mut self, part: Self) {
+    pub fn extend(&mut self, part: Self) {
         for (column, more) in
             self.columns.iter_mut().chain(&mut self.time).zip(part.columns.iter().chain(&part.time))
         {
@@ -131,17 +157,17 @@ impl Table {
 
 /// The columns that were read.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Table {
+pub struct Table {
     /// The selected columns, in the selection's order; a missing value is NaN.
-    pub(crate) columns: Vec<Vec<f64>>,
+    pub columns: Vec<Vec<f64>>,
     /// The times in seconds: as they are if they are numbers, and since the first one if they are dates.
-    pub(crate) time: Option<Vec<f64>>,
+    pub time: Option<Vec<f64>>,
     /// The first time as it is written, if it is a date.
-    pub(crate) start: Option<String>,
+    pub start: Option<String>,
     /// The number of rows.
-    pub(crate) rows: usize,
+    pub rows: usize,
     /// The line on which each row is; nothing where there are no lines.
-    pub(crate) lines: Lines,
+    pub lines: Lines,
     /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
+    pub words: Vec<String>,
 }

@@ -2,10 +2,10 @@ use std::io::{self, Cursor, Read};
 use std::sync::mpsc::{Receiver, sync_channel};
 
 use super::{comma, gzip, plain};
-use crate::table::reader::TextReader;
-use crate::table::source::{Bytes, Source};
-use crate::table::stream::TextStream;
-use crate::table::{Event, Options, Selection};
+use crate::reader::TextReader;
+use crate::source::{Bytes, Source};
+use crate::stream::TextStream;
+use crate::{Event, Options, Selection};
 
 /// What a stream gave: rows as they are, errors as they read.
 fn all(mut stream: TextStream) -> Vec<String> {

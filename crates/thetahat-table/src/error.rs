@@ -7,7 +7,7 @@ const SHOWN: usize = 40;
 
 /// Whose fault an [`Error`] is.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
-pub(crate) enum ErrorKind {
+pub enum ErrorKind {
     /// The bytes could not be read: no such file, no permission, a truncated gzip stream.
     Io,
     /// The bytes were read, but they are not the table that was asked for.
@@ -16,7 +16,7 @@ pub(crate) enum ErrorKind {
 
 /// A reading error: one line that names the file, the position and the remedy.
 #[derive(Clone, Debug, Eq, PartialEq)]
-pub(crate) struct Error {
+pub struct Error {
     kind: ErrorKind,
     file: String,
     position: Option<Position>,
@@ -70,7 +70,7 @@ impl Error {
     }
 
     /// Whose fault it is.
-    pub(crate) fn kind(&self) -> ErrorKind {
+    pub fn kind(&self) -> ErrorKind {
         self.kind
     }
 }

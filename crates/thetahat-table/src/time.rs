@@ -64,7 +64,7 @@ fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
     match format {
         Some(format) => formatted(field, format).map_err(|reason| {
             format!(
-                "{} does not follow --time-format {} ({}); correct one of them",
+                "{} does not follow `time-format` {} ({}); correct one of them",
                 quoted(field),
                 quoted(format.as_bytes()),
                 escaped(&reason.to_string())
@@ -73,7 +73,7 @@ fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
         None => iso(field).map_err(|reason| {
             format!(
                 "{} is not a date and time as in 2024-03-01T12:00:00.250Z ({}); correct it, or describe \
-                 it, as in --time-format '%d.%m.%Y %H:%M:%S%.f'",
+                 it, as in `time-format` '%d.%m.%Y %H:%M:%S%.f'",
                 quoted(field),
                 escaped(&reason.to_string())
             )
@@ -168,14 +168,14 @@ mod tests {
         assert!(
             seconds("1", None, "2024-03-01").is_err_and(|message| message.contains("first time is a number"))
         );
-        assert!(seconds("2024-03-01", None, "1").is_err_and(|message| message.contains("--time-format")));
+        assert!(seconds("2024-03-01", None, "1").is_err_and(|message| message.contains("`time-format`")));
         assert!(
             seconds("2024-03-01", None, "2024-02-30").is_err_and(|message| message.contains("2024-02-30"))
         );
-        assert!(seconds("12:00", None, "12:00").is_err_and(|message| message.contains("--time-format")));
-        assert!(seconds("0,5", None, "").is_err_and(|message| message.contains("--decimal-comma")));
+        assert!(seconds("12:00", None, "12:00").is_err_and(|message| message.contains("`time-format`")));
+        assert!(seconds("0,5", None, "").is_err_and(|message| message.contains("`decimal-comma`")));
         assert!(
-            seconds("1.3.24", Some("%Y"), "1").is_err_and(|message| message.contains("--time-format \"%Y\""))
+            seconds("1.3.24", Some("%Y"), "1").is_err_and(|message| message.contains("`time-format` \"%Y\""))
         );
         // Neither a weekday nor a zone says when.
         assert!(seconds("Mon 12:00", Some("%a %H:%M"), "").is_err());

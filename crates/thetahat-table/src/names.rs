@@ -9,7 +9,7 @@ const COMMAS: Dialect = Dialect { delimiter: b',', comment: None };
 ///
 /// # Errors
 /// A message for a quote that is not closed.
-pub(crate) fn names(list: &str) -> Result<Vec<String>, String> {
+pub fn names(list: &str) -> Result<Vec<String>, String> {
     if list.trim().is_empty() {
         // A blank line is no row.
         return Ok(vec![String::new()]);
@@ -24,7 +24,7 @@ pub(crate) fn names(list: &str) -> Result<Vec<String>, String> {
 }
 
 /// A list that [`names`] reads as these names.
-pub(crate) fn list(names: &[&str]) -> String {
+pub fn list(names: &[&str]) -> String {
     let field = |name: &&str| {
         if name.contains([',', '"', '\n']) {
             format!("\"{}\"", name.replace('"', "\"\""))

@@ -9,7 +9,7 @@ const WAITING: usize = 4;
 
 /// What comes next.
 #[derive(Debug)]
-pub(crate) enum Event {
+pub enum Event {
     /// A row: what the stream gives is its own.
     Row,
     /// A line that is no row. It was left out.
@@ -76,10 +76,11 @@ impl<Piece: Send + 'static> Mailbox<Piece> {
 }
 
 /// Ends a stream from another thread: it wakes if it waits.
-pub(crate) struct Waker(Box<dyn Fn() + Send + Sync>);
+pub struct Waker(Box<dyn Fn() + Send + Sync>);
 
 impl Waker {
-    pub(crate) fn wake(&self) {
+    /// Ends the stream: what waits for a row gets [`Event::Stopped`].
+    pub fn wake(&self) {
         self.0();
     }
 }

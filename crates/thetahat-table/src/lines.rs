@@ -6,7 +6,7 @@
 /// them further apart. Only the rows at which the distance changes are stored, so a plain log costs one
 /// entry.
 #[derive(Clone, Debug, Default, Eq, PartialEq)]
-pub(crate) struct Lines {
+pub struct Lines {
     /// Each run's first row, and by how much its lines are ahead of its rows.
     runs: Vec<(usize, u64)>,
 }
@@ -14,7 +14,7 @@ pub(crate) struct Lines {
 impl Lines {
     /// A row of a file, or of a part of it after so many rows, as messages name it: by its line, as an editor counts, or without
     /// lines by its number.
-    pub(crate) fn place(&self, file: &str, row: usize, before: usize) -> String {
+    pub fn place(&self, file: &str, row: usize, before: usize) -> String {
         if self.runs.is_empty() {
             format!("{file}: row {}", before + row + 1)
         } else {

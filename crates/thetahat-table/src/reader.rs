@@ -1,5 +1,7 @@
 //! Reading a text table from its first byte to its last.
 
+use std::ops::ControlFlow;
+
 use memchr::{memchr, memchr_iter, memrchr};
 
 use super::block::Block;
@@ -32,7 +34,7 @@ const LOOKED_AT: usize = 1000;
 pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
 
 /// A text table whose columns are known and whose rows are still to be read.
-pub(crate) struct TextReader {
+pub(super) struct TextReader {
     options: Options,
     sizes: Sizes,
     source: Source,
@@ -115,7 +117,7 @@ impl TextReader {
             // It is there as well if the name was decoded by a wrong encoding.
             if text.contains(char::REPLACEMENT_CHARACTER) {
                 let message = format!(
-                    "its name {} is not UTF-8; name the file's encoding, as in --encoding windows-1252",
+                    "its name {} is not UTF-8; name the file's encoding, as in `encoding` windows-1252",
                     quoted(name)
                 );
                 self.undecoded_names.push((index, self.layout.fault(&self.row(), index, &message)));
@@ -159,13 +161,13 @@ impl TextReader {
     }
 
     /// The names of the columns, as they are in the header; without one they are numbered from `1`.
-    pub(crate) fn names(&self) -> &[String] {
+    pub(super) fn names(&self) -> &[String] {
         &self.layout.names
     }
 
     /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
     /// is a number, and not all are missing.
-    pub(crate) fn words(&self) -> Vec<bool> {
+    pub(super) fn words(&self) -> Vec<bool> {
         let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
         let dialect = self.layout.dialect;
         let mut text = &self.current.text()[self.position..];
@@ -194,18 +196,18 @@ impl TextReader {
     }
 
     /// The columns of which the name is not UTF-8 and cannot be shown.
-    pub(crate) fn nameless(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn nameless(&self) -> impl Iterator<Item = usize> {
         self.undecoded_names.iter().map(|(column, _)| *column)
     }
 
     /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
-    pub(super) fn read_parts<E: From<Error>>(
+    pub(super) fn read_parts(
         self,
         selection: &Selection,
         most: Option<usize>,
         progress: &mut dyn FnMut(u64, Option<u64>),
-        take: &mut dyn FnMut(Table) -> Result<(), E>,
-    ) -> Result<(), E> {
+        take: &mut dyn FnMut(Table) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
         let fields = self.fields(selection)?;
         let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
         let (clock, start) = self.clock(selection, &numbers)?;
@@ -243,19 +245,20 @@ impl TextReader {
             if let Some(words) =
                 options.bound.and_then(|bound| bound.passed_by(rows.count * plan.fields.len()))
             {
-                return Err(plan.layout.too_large(rows.line, &words).into());
+                return Err(plan.layout.too_large(rows.line, &words));
             }
             let left = &text[taken..];
             if current.is_last() {
                 if !left.is_empty() {
                     let row = Row { record: &record, text: left, line: rows.line };
-                    return Err(plan.layout.unclosed(&row).into());
+                    return Err(plan.layout.unclosed(&row));
                 }
                 progress(source.bytes_read(), source.total());
-                return take(plan.table(rows, selection, start));
+                let _ = take(plan.table(rows, selection, start));
+                return Ok(());
             }
             if left.len() > sizes.row {
-                return Err(plan.layout.too_long(rows.line, sizes.row).into());
+                return Err(plan.layout.too_long(rows.line, sizes.row));
             }
             filled?;
             next.prepend(&whole[taken..]);
@@ -264,7 +267,10 @@ impl TextReader {
             position = 0;
             if most.is_some_and(|most| rows.count >= most) {
                 let after = Rows::new(plan.fields.len(), rows.line);
-                take(plan.table(std::mem::replace(&mut rows, after), selection, start.clone()))?;
+                let part = plan.table(std::mem::replace(&mut rows, after), selection, start.clone());
+                if take(part).is_break() {
+                    return Ok(());
+                }
             }
         }
     }
@@ -272,7 +278,7 @@ impl TextReader {
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
     /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
     /// from the first one.
-    pub(crate) fn stream(
+    pub(super) fn stream(
         self,
         selection: &Selection,
         whole_lines: bool,

@@ -47,36 +47,60 @@ pub trait Document: Serialize + DeserializeOwned + JsonSchema {
     ///
     /// # Errors
     /// [`Error::Report`] if it cannot be written as JSON.
-    fn to_json(&self) -> Result<String, Error> {
-        let mut json = serde_json::to_string_pretty(self).map_err(|error| {
-            Error::report(format!("the {} cannot be written as JSON: {error}", Self::NAME))
-        })?;
-        json.push('\n');
-        Ok(text::escaped_json(json))
-    }
+    fn to_json(&self) -> Result<String, Error>;
 
     /// Reads a document back. Fields that are not known are left out.
     ///
     /// # Errors
     /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema; if its
     /// parts do not fit together.
-    fn from_json(text: &str) -> Result<Self, Error> {
-        let malformed = |error: serde_json::Error| {
-            Error::report(format!("this is not a thetahat {}: {error}; {}", Self::NAME, Self::REMEDY))
-        };
-        let schema = schema(text).map_err(malformed)?;
-        if schema != Self::SCHEMA && !schema.starts_with(&format!("{}.", Self::SCHEMA)) {
-            return Err(Error::report(Self::refusal(&schema)));
-        }
-        let document: Self = serde_json::from_str(text).map_err(malformed)?;
-        document.check()?;
-        Ok(document)
-    }
+    fn from_json(text: &str) -> Result<Self, Error>;
 
     /// The JSON Schema of the document.
-    fn json_schema() -> serde_json::Value {
-        schemars::schema_for!(Self).to_value()
+    fn json_schema() -> serde_json::Value;
+}
+
+/// The methods of a [`Document`] that write, read and describe it. They stand in each `impl`, and not in the trait, so that they
+/// are compiled once, with this crate: a provided method is compiled anew in every crate that calls it, and with it all that
+/// serde and schemars make of the document's fields.
+macro_rules! document_methods {
+    () => {
+        #[inline(never)]
+        fn to_json(&self) -> Result<String, crate::Error> {
+            crate::document::to_json(self)
+        }
+
+        #[inline(never)]
+        fn from_json(text: &str) -> Result<Self, crate::Error> {
+            crate::document::from_json(text)
+        }
+
+        #[inline(never)]
+        fn json_schema() -> serde_json::Value {
+            schemars::schema_for!(Self).to_value()
+        }
+    };
+}
+pub(crate) use document_methods;
+
+pub(crate) fn to_json<D: Document>(document: &D) -> Result<String, Error> {
+    let mut json = serde_json::to_string_pretty(document)
+        .map_err(|error| Error::report(format!("the {} cannot be written as JSON: {error}", D::NAME)))?;
+    json.push('\n');
+    Ok(text::escaped_json(json))
+}
+
+pub(crate) fn from_json<D: Document>(text: &str) -> Result<D, Error> {
+    let malformed = |error: serde_json::Error| {
+        Error::report(format!("this is not a thetahat {}: {error}; {}", D::NAME, D::REMEDY))
+    };
+    let schema = schema(text).map_err(malformed)?;
+    if schema != D::SCHEMA && !schema.starts_with(&format!("{}.", D::SCHEMA)) {
+        return Err(Error::report(D::refusal(&schema)));
     }
+    let document: D = serde_json::from_str(text).map_err(malformed)?;
+    document.check()?;
+    Ok(document)
 }
 
 fn schema(text: &str) -> serde_json::Result<String> {

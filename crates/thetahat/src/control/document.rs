@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::RstController;
 use thetahat_core::nalgebra::{DVector, Dyn};
 
+use crate::document::document_methods;
 use crate::model::{Root, Signal};
 use crate::{Document, Error};
 
@@ -136,6 +137,8 @@ impl Document for Control {
     const NAME: &'static str = "controller";
     const SCHEMA: &'static str = "thetahat.control/1";
     const REMEDY: &'static str = "give a file that control wrote";
+
+    document_methods!();
 
     fn check(&self) -> Result<(), Error> {
         if !(self.sample_time > 0.0 && self.sample_time.is_finite()) {

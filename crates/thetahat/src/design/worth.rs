@@ -8,6 +8,7 @@ use super::figures::SignalFigures;
 use super::planned::Prior;
 use super::signal::{SignalPlan, TestSignal};
 use super::want::{Figure, Want, figures};
+use crate::document::document_methods;
 use crate::model::PolynomialModel;
 use crate::{Document, Error};
 
@@ -125,6 +126,8 @@ impl Document for ExperimentDesign {
     const NAME: &'static str = "design of an experiment";
     const SCHEMA: &'static str = "thetahat.design/1";
     const REMEDY: &'static str = "give a file that design wrote";
+
+    document_methods!();
 }
 
 /// The figures that are compared.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use super::StateFilter;
 use super::estimate::StateValues;
 use crate::Document;
+use crate::document::document_methods;
 use crate::respond::NisSummary;
 
 /// What a [`StateFilter`] has come to: the JSON document `thetahat.filter/1`.
@@ -88,4 +89,6 @@ impl Document for FilterSummary {
     const NAME: &'static str = "summary";
     const SCHEMA: &'static str = "thetahat.filter/1";
     const REMEDY: &'static str = "give a file that filter wrote";
+
+    document_methods!();
 }

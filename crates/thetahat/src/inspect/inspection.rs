@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Document;
 use crate::data::Source;
+use crate::document::document_methods;
 use crate::validate::feedback;
 
 /// What a log is worth, before any fit. The JSON document `thetahat.inspection/1`.
@@ -303,4 +304,6 @@ impl Document for Inspection {
     const NAME: &'static str = "inspection";
     const SCHEMA: &'static str = "thetahat.inspection/1";
     const REMEDY: &'static str = "give a file that inspect wrote";
+
+    document_methods!();
 }

@@ -22,6 +22,7 @@ use super::schema::{Data, Missing, Report};
 use super::state_space::StateSpacePlan;
 use super::totals::Totals;
 use crate::data::{Log, Record, Rows, Source, digests};
+use crate::document::document_methods;
 use crate::estimate::{SegmentStart, joint_products, joint_taps, lagged_products};
 use crate::regression::ExtendedGram;
 use crate::respond::InitialCondition;
@@ -535,6 +536,8 @@ impl Document for NormalEquations {
     const NAME: &'static str = "document of normal equations";
     const SCHEMA: &'static str = "thetahat.normal-equations/1";
     const REMEDY: &'static str = "give one that a piece was made into";
+
+    document_methods!();
 
     fn check(&self) -> Result<(), Error> {
         let channels = self.settings.names().len();

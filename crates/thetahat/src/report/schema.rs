@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Prefilter, Rows, Source};
+use crate::document::document_methods;
 use crate::estimate::{Criteria, Initial, Procedure};
 use crate::model::{Model, Quantity};
 use crate::select::Selection;
@@ -132,6 +133,8 @@ impl Document for Report {
     const NAME: &'static str = "report";
     const SCHEMA: &'static str = "thetahat.report/1";
     const REMEDY: &'static str = "give a file that fit wrote";
+
+    document_methods!();
 
     fn check(&self) -> Result<(), Error> {
         self.model.check()

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::plan::Method;
 use crate::data::{Rows, Source};
+use crate::document::document_methods;
 use crate::respond::FrequencyResponse;
 use crate::{Document, Error};
 
@@ -75,6 +76,8 @@ impl Document for MeasuredResponse {
     const NAME: &'static str = "response";
     const SCHEMA: &'static str = "thetahat.response/1";
     const REMEDY: &'static str = "give a file that spectrum wrote";
+
+    document_methods!();
 
     fn check(&self) -> Result<(), Error> {
         let wrong = |what: &str| Err(Error::report(format!("{what}; {}", Self::REMEDY)));

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::data::{Rows, Source};
+use crate::document::document_methods;
 use crate::model::{Parameter, ProcessStructure, Quantity};
 use crate::{Document, Error};
 
@@ -299,6 +300,8 @@ impl Document for StepTest {
     const NAME: &'static str = "step test";
     const SCHEMA: &'static str = "thetahat.step/1";
     const REMEDY: &'static str = "give a file that step wrote of a log";
+
+    document_methods!();
 
     fn check(&self) -> Result<(), Error> {
         let both = |step: &Step| step.response.is_some() != step.refused.is_some();

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Tracker;
 use crate::Document;
+use crate::document::document_methods;
 use crate::model::{Map, Orders, Parameter};
 
 /// What trackers of one log have come to, side by side: the JSON document `thetahat.track/1`.
@@ -108,4 +109,6 @@ impl Document for TrackSummary {
     const NAME: &'static str = "summary";
     const SCHEMA: &'static str = "thetahat.track/1";
     const REMEDY: &'static str = "give a file that track wrote";
+
+    document_methods!();
 }

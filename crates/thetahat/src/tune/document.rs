@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Document;
+use crate::document::document_methods;
 
 /// Settings of controllers for a process, and what the loops with them do. The JSON document `thetahat.tuning/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -135,4 +136,6 @@ impl Document for Tuning {
     const NAME: &'static str = "tuning";
     const SCHEMA: &'static str = "thetahat.tuning/1";
     const REMEDY: &'static str = "give a file that tune wrote";
+
+    document_methods!();
 }

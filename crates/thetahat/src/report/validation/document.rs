@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::Document;
 use crate::data::{Rows, Source};
+use crate::document::document_methods;
 use crate::estimate::Criteria;
 use crate::model::{Orders, Structure};
 use crate::spectrum::Agreement;
@@ -125,10 +126,14 @@ impl Document for Validation {
     const NAME: &'static str = "validation";
     const SCHEMA: &'static str = "thetahat.validation/1";
     const REMEDY: &'static str = "give a file that validate wrote";
+
+    document_methods!();
 }
 
 impl Document for Comparison {
     const NAME: &'static str = "comparison";
     const SCHEMA: &'static str = "thetahat.comparison/1";
     const REMEDY: &'static str = "give a file that compare wrote";
+
+    document_methods!();
 }

@@ -12,14 +12,15 @@ fn options(weighting: Weighting, past: usize, future: usize) -> SubspaceOptions 
     SubspaceOptions { weighting, past: Some(past), future: Some(future), ..SubspaceOptions::default() }
 }
 
-/// The channels of a public log: of those in the repository, or beside it; where it is absent, says so.
+/// The channels of a public log: of those in the repository, or in the folder that THETAHAT_LOGS names; where it is absent, says so.
 fn public_log(name: &str) -> Option<Vec<Vec<f64>>> {
-    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../../");
-    let found = ["tests/data/public", "../shared/data"]
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/public").to_owned();
+    let found = [Some(own), std::env::var("THETAHAT_LOGS").ok()]
         .iter()
-        .find_map(|folder| std::fs::read_to_string(format!("{root}{folder}/{name}.csv")).ok());
+        .flatten()
+        .find_map(|folder| std::fs::read_to_string(format!("{folder}/{name}.csv")).ok());
     let Some(text) = found else {
-        let line = format!("skipped: {name}.csv is not in ../shared/data\n");
+        let line = format!("skipped: {name}.csv is in no folder of logs; THETAHAT_LOGS names one\n");
         let _ = std::io::stderr().write_all(line.as_bytes());
         return None;
     };

@@ -1,5 +1,5 @@
-//! Values that other programs found in public logs. Some of these logs are in tests/data/public, the others beside the
-//! repository; tests of those that are absent skip, and say which.
+//! Values that other programs found in public logs. Some of these logs are in tests/data/public, the others in the folder that
+//! THETAHAT_LOGS names; tests of those that are absent skip, and say which.
 
 use std::fs;
 use std::io::Write;
@@ -14,17 +14,17 @@ use thetahat::optimize::Search;
 use crate::harness::{Answer, Folder, number, numbers, parameters};
 use crate::signals::csv;
 
-/// Where a public log is: among those that come with the tests, or beside the repository; where it is absent, says so.
+/// Where a public log is: among those that come with the tests, or in the folder that THETAHAT_LOGS names; where it is absent,
+/// says so.
 pub(crate) fn public_log(name: &str) -> Option<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let path = ["tests/data/public", "../shared/data"]
-        .map(|folder| root.join(folder).join(name))
-        .into_iter()
-        .find(|path| path.exists());
+    let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/public");
+    let more = std::env::var_os("THETAHAT_LOGS").map(PathBuf::from);
+    let path =
+        [Some(own), more].into_iter().flatten().map(|folder| folder.join(name)).find(|path| path.exists());
     if path.is_none() {
         let thread = std::thread::current();
         let test = thread.name().unwrap_or_default();
-        let line = format!("skipped: {name} is not in ../shared/data ({test})\n");
+        let line = format!("skipped: {name} is in no folder of logs; THETAHAT_LOGS names one ({test})\n");
         // Straight to standard error: the test runner keeps to itself what a test prints that passes.
         let _ = std::io::stderr().write_all(line.as_bytes());
     }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
+use crate::fit_reference::folder_with_any;
 use crate::harness::{Folder, number};
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
@@ -317,11 +318,7 @@ fn public_logs_are_predicted_as_well_as_by_others() {
             [79.3, 73.7],
         ),
     ] {
-        let Ok(log) = std::fs::read(format!("../shared/data/{name}.csv")) else {
-            println!("../shared/data/{name}.csv is absent: not tested");
-            continue;
-        };
-        let folder = Folder::with_log(log);
+        let Some(folder) = folder_with_any(&format!("{name}.csv")) else { continue };
         folder
             .done(&format!("fit log.csv -y {} --sample-time 1 {options} --report r.json", outputs.join(",")));
         let found = validated(&folder, &format!("--sample-time 1 --rows {rows} --horizon 5"));
@@ -481,11 +478,7 @@ fn an_arx_model_has_several_outputs() {
 /// The figures that a least-squares fit of all rows has.
 #[test]
 fn the_evaporator_has_the_coefficients_that_others_find() {
-    let Ok(log) = std::fs::read("../shared/data/evaporator.csv") else {
-        println!("../shared/data/evaporator.csv is absent: not tested");
-        return;
-    };
-    let folder = Folder::with_log(log);
+    let Some(folder) = folder_with_any("evaporator.csv") else { return };
     folder.done(
         "fit log.csv -y y1,y2,y3 --sample-time 1 --model arx --na 2 --nb 2 --nk 1 --couple full --detrend none --report r.json",
     );

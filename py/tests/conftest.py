@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from pathlib import Path
 
@@ -25,9 +26,11 @@ def motor() -> th.Log:
 
 
 def public_log(name: str) -> Path:
-    """Where a public log is: among those that come with the tests, or beside the repository."""
-    root = Path(__file__).parents[2]
-    for folder in (root / "tests" / "data" / "public", root.parent / "shared" / "data"):
+    """Where a public log is: among those that come with the tests, or in the folder that THETAHAT_LOGS names."""
+    folders = [Path(__file__).parents[2] / "tests" / "data" / "public"]
+    if more := os.environ.get("THETAHAT_LOGS"):
+        folders.append(Path(more))
+    for folder in folders:
         if (folder / name).exists():
             return folder / name
-    pytest.skip(f"{name} is not in ../shared/data")
+    pytest.skip(f"{name} is in no folder of logs: THETAHAT_LOGS names one")

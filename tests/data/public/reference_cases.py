@@ -5,6 +5,7 @@ full regressor and have e = 0 there; the others start from zero. Standard errors
 """
 
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 HERE = Path(__file__).parent
-FOLDERS = HERE, HERE.parents[3] / "shared" / "data"
+FOLDERS = [HERE, *map(Path, filter(None, [os.environ.get("THETAHAT_LOGS")]))]
 
 
 def signals(case, path):

@@ -1,4 +1,4 @@
-.PHONY: demo check test format lint docs unit rust chromium embedded python wheel soak soak-track monte-carlo bench
+.PHONY: demo check test test-long format lint docs unit rust core chromium embedded images python wheel soak soak-track monte-carlo bench build-cost
 
 # Fit the sample log that the program carries.
 demo:
@@ -7,9 +7,12 @@ demo:
 # What is run while one works: formatting, lints, unit tests; within a minute where little has changed since the last run.
 check: format lint unit
 
-# Everything that must pass. A tool that is missing is installed where that is possible; else its check is skipped by
-# name, or fails where CI=true.
+# Whatever a change can break: all must pass. A tool that is missing is installed where that is possible; else its check is
+# skipped by name, or fails where CI=true.
 test: format lint docs rust embedded python
+
+# What takes long, beside that: the core on its own, images for more processors, endurance, and simulated logs by the score.
+test-long: core images soak soak-track monte-carlo
 
 format:
 	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers examples/self_tuning_heater tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
@@ -19,7 +22,7 @@ lint docs: export PYO3_NO_PYTHON = 1
 lint docs: export PYO3_BUILD_EXTENSION_MODULE = 1
 
 lint:
-	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-targets --all-features -- -D warnings && cargo clippy --locked -p thetahat --test monte_carlo --test residual_tests -- -D warnings)
+	@$(call with,clippy,clippy,cargo clippy --locked --workspace --all-features --lib --bins --examples --tests --benches --test monte_carlo --test residual_tests --test soak -- -D warnings)
 	@cd tests/embedded && $(call with,clippy,clippy,cargo clippy --locked --lib --bin check --tests -- -D warnings)
 
 docs:
@@ -28,17 +31,12 @@ docs:
 unit:
 	cargo test --locked --workspace --all-features --lib
 
-# thetahat-core once more on its own: there it has no heap.
 rust: chromium
-	cargo test --locked -p thetahat-core
 	cargo test --locked --workspace --all-features
 
-# The long runs of the online estimators in single precision, 10^6 steps each; `make soak` takes 10^8.
-	cargo test --locked --release -p thetahat-core --test soak
-
-# Simulated logs by the score: do intervals cover the truth, are hard cases found, are true orders chosen, do tests keep
-# their level? `make monte-carlo` takes 100, 200 or 2000 of each kind.
-	cargo test --locked --release -p thetahat --test monte_carlo --test residual_tests
+# thetahat-core once more on its own: there it has no heap.
+core:
+	cargo test --locked -p thetahat-core
 
 # Opens the pages of --html; where it is not there and cannot be installed, its tests are skipped by name.
 chromium:
@@ -49,6 +47,10 @@ chromium:
 embedded:
 	tests/embedded/run
 
+# The same, with images of one estimator each for three processors.
+images:
+	tests/embedded/run --images
+
 # The Python package in an environment of its own: its tests, the examples in its documentation, its types.
 python:
 	py/tests/run
@@ -57,6 +59,7 @@ python:
 wheel:
 	py/tests/run --release
 
+# The online estimators in single precision, 10^8 steps each.
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
 
@@ -64,6 +67,7 @@ soak:
 soak-track:
 	SOAK_STEPS=100000000 cargo test --locked --release --test end_to_end -- --nocapture track_soak
 
+# Simulated logs by the score: do intervals cover the truth, are hard cases found, are true orders chosen, do tests keep their level?
 monte-carlo:
 	MONTE_CARLO=200 cargo test --locked --release -p thetahat --test monte_carlo -- --nocapture
 	MONTE_CARLO=2000 cargo test --locked --release -p thetahat --test residual_tests -- --nocapture
@@ -72,6 +76,10 @@ monte-carlo:
 bench:
 	cargo bench --locked --bench arx --bench online --bench track
 	benches/peers/run
+
+# What a build costs, from nothing: its time, the memory of the largest rustc, the sizes of program and wheel.
+build-cost:
+	benches/build_cost
 
 # $(call with,COMPONENT,SUBCOMMAND,CHECK): runs the check if cargo has the subcommand or rustup can add the component.
 with = if cargo $(2) --version >/dev/null 2>&1 || rustup component add $(1) >/dev/null 2>&1; then $(3); \

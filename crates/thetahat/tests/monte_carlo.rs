@@ -1,7 +1,7 @@
 //! What holds over many simulated logs: intervals cover the truth, hard cases are found from the default start, and the true
 //! structure and orders are chosen with nothing asked for.
 //!
-//! `make monte-carlo` does the full numbers; `make test` fewer. `MONTE_CARLO` is the number of runs of each kind.
+//! `make monte-carlo` does the full numbers. `MONTE_CARLO` is the number of runs of each kind; without it they are fewer.
 
 #[path = "monte_carlo/design.rs"]
 mod design;

@@ -1,6 +1,6 @@
 //! How often tests of residuals reject models that are true, and models that are not.
 //!
-//! `make monte-carlo` does 2000 runs of each kind; `make test` fewer. `MONTE_CARLO` is the number.
+//! `make monte-carlo` does 2000 runs of each kind. `MONTE_CARLO` is the number; without it they are fewer.
 
 #[path = "monte_carlo/simulated.rs"]
 mod simulated;

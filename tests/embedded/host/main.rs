@@ -1,8 +1,8 @@
 //! Checks the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
 //!
 //! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
-//! of the reporting one. It prints the tables of costs and sizes, and compares them with `budgets.md` and with
-//! `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
+//! of the reporting one. It prints the table of costs, with `--images` also that of the sizes of images with one estimator, and
+//! compares them with `budgets.md` and with `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
 //! in its other build. `--c` is for what is written in C: the bits that it printed, and the costs of exported models.
 
 #[path = "../../../crates/thetahat-c/tests/interface/steps.rs"]
@@ -48,11 +48,12 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let checked = match &arguments[..] {
         [folder] => costs(Path::new(folder), false),
-        [folder, "--write"] => costs(Path::new(folder), true),
+        [folder, "--images"] => every_cost(Path::new(folder), false),
+        [folder, "--images", "--write"] => every_cost(Path::new(folder), true),
         [folder, "--bits"] => bits(Path::new(folder)).map(|_| Vec::new()),
         [folder, "--c"] => written_in_c(Path::new(folder), false),
         [folder, "--c", "--write"] => written_in_c(Path::new(folder), true),
-        _ => Err("usage: check FOLDER [--bits | [--c] [--write]]".into()),
+        _ => Err("usage: check FOLDER [--bits | --images [--write] | --c [--write]]".into()),
     };
     match checked {
         Ok(faults) if faults.is_empty() => ExitCode::SUCCESS,
@@ -108,7 +109,14 @@ fn c_bits(folder: &Path) -> Result<(), Box<dyn Error>> {
     if firmware == host { Ok(()) } else { Err(message()) }
 }
 
-/// Checks everything. Returns what is wrong with the tables.
+/// Checks the costs of steps and the sizes of images. Returns what is wrong with their tables.
+fn every_cost(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
+    let mut faults = costs(folder, write)?;
+    faults.extend(check(&IMAGES, &images(folder)?, write)?);
+    Ok(faults)
+}
+
+/// Checks what the firmware printed and what its steps cost. Returns what is wrong with the table of costs.
 fn costs(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
     let mut measured = Table::new(&STEPS);
     for ((profile, level), log) in LEVELS.into_iter().zip(bits(folder)?) {
@@ -123,9 +131,7 @@ fn costs(folder: &Path, write: bool) -> Result<Vec<String>, Box<dyn Error>> {
             measured.add_costs(&step.name, step.ram, Costs { code, stack: step.stack, typical, worst });
         }
     }
-    let mut faults = check(&STEPS, &measured, write)?;
-    faults.extend(check(&IMAGES, &images(folder)?, write)?);
-    Ok(faults)
+    check(&STEPS, &measured, write)
 }
 
 /// How large the images with one estimator are. They hold neither panics nor an allocator.

@@ -1,4 +1,4 @@
-.PHONY: demo check test test-long format lint docs unit rust core chromium embedded images python wheel soak soak-track monte-carlo bench build-cost
+.PHONY: demo check test test-long format lint docs unit rust core chromium arm embedded images python wheel soak soak-track monte-carlo bench build-cost
 
 # Fit the sample log that the program carries.
 demo:
@@ -31,7 +31,7 @@ docs:
 unit:
 	cargo test --locked --workspace --all-features --lib
 
-rust: chromium
+rust: chromium arm
 	cargo test --locked --workspace --all-features
 
 # thetahat-core once more on its own: there it has no heap.
@@ -42,6 +42,11 @@ core:
 chromium:
 	@command -v chromium >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -q && \
 	apt-get install -y -q --no-install-recommends chromium fonts-dejavu-core; } >/dev/null 2>&1 || true
+
+# Compiles exported models for a Cortex-M; as above.
+arm:
+	@command -v arm-none-eabi-gcc >/dev/null || { [ "$$(id -u)" = 0 ] && apt-get update -q && \
+	apt-get install -y -q --no-install-recommends gcc-arm-none-eabi libnewlib-arm-none-eabi; } >/dev/null 2>&1 || true
 
 # The firmware in an emulator, in Rust and in C: the host's bits, no panic, and what a step costs.
 embedded:

@@ -155,6 +155,20 @@ def test_ctrl_c_ends_what_takes_long(before: str, function: str, arguments: str)
     assert done.stdout == "interrupted 0\n", done.stderr
 
 
+def test_parts_of_numpy_are_there_before_threads_are() -> None:
+    # NumPy loads some at their first use: of several threads that meet there, one may recurse without end.
+    code = """
+        import sys
+        import thetahat as th
+        log = th.Log([1.0, 3.0, 2.0, 4.0, 1.0], [0.0, 1.0, 0.0, 1.0, 0.0])
+        loaded = set(sys.modules)
+        th.arx(log, 1, 1, constant=False)
+        th.ExtendedKalmanFilter([0.0], [[1.0]])
+        print(sorted(name for name in set(sys.modules) - loaded if name.startswith("numpy")))
+        """
+    assert python(code).stdout == "[]\n"
+
+
 def test_a_daemon_thread_in_a_function_of_a_model_ends_with_the_interpreter() -> None:
     code = """
         import threading

@@ -8,6 +8,7 @@ from typing import Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
+from numpy.random import default_rng
 from numpy.typing import ArrayLike
 
 from thetahat import _options, _thetahat
@@ -371,7 +372,7 @@ def _stepped(model: Model, samples: int, noise: bool, seed: int) -> Callable[[fl
     if np.any(space.D != 0):
         raise ValueError("plant: its input acts at once, so that there is no loop without a delay")
     deviation = np.sqrt(np.asarray(model.noise_covariance)[0, 0]) if noise else 0.0
-    disturbances = iter(deviation * np.random.default_rng(seed).standard_normal(samples + 1))
+    disturbances = iter(deviation * default_rng(seed).standard_normal(samples + 1))
     x, e = np.zeros(space.F.shape[0]), 0.0
     first = True
 

@@ -18,6 +18,7 @@ from typing import Any, Union
 
 import narwhals.stable.v2 as nw
 import numpy as np
+import numpy.ma as ma  # At its first `np.ma` NumPy loads it, which threads must not meet in.
 from narwhals.exceptions import DuplicateError
 from numpy.typing import ArrayLike, NDArray
 
@@ -50,7 +51,7 @@ def array(argument: str, value: Any) -> Array:
     ValueError
         If rows differ in length, two columns have one name, or a number is too large.
     """
-    if isinstance(value, np.ma.MaskedArray):
+    if isinstance(value, ma.MaskedArray):
         return _of_masked(argument, value)
     if not isinstance(value, (list, tuple, np.ndarray, np.generic)):
         native = of_library(argument, value)
@@ -175,12 +176,12 @@ def is_null(entry: object) -> bool:
     return entry is None or entry is getattr(sys.modules.get("pandas"), "NA", None)
 
 
-def _of_masked(argument: str, value: np.ma.MaskedArray[Any, Any]) -> Array:
+def _of_masked(argument: str, value: ma.MaskedArray[Any, Any]) -> Array:
     """What is masked is missing, whatever lies behind the mask."""
     if value.dtype.kind in "biuf":
-        filled: NDArray[Any] = np.ma.filled(value.astype(np.float64), np.nan)
+        filled: NDArray[Any] = ma.filled(value.astype(np.float64), np.nan)
         return np.asarray(filled, order="C")
-    missing = np.ma.getmaskarray(value)
+    missing = ma.getmaskarray(value)
     found = np.array(value.data)
     if found.dtype.kind == "O":
         found[missing] = None

@@ -10,6 +10,7 @@ import numbers
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.ma as ma
 
 try:
     from sklearn.base import BaseEstimator, RegressorMixin
@@ -241,7 +242,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         # scikit-learn reads what lies behind a mask.
         inputs: NDArray[np.float64] = validate_data(
             self,
-            _numbers.array("X", X) if isinstance(X, np.ma.MaskedArray) else X,
+            _numbers.array("X", X) if isinstance(X, ma.MaskedArray) else X,
             reset=reset,
             dtype=np.float64,
             ensure_min_samples=2 if reset else 1,

@@ -66,13 +66,12 @@ use std::ops::ControlFlow;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::{Monitor, Search, Stopped};
 
 use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, Structure};
 use crate::model::{PolynomialModel, Signal};
-use crate::optimize::{Monitor, Search, Stopped};
-pub use crate::regression::Solver;
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f, lagged_products, out_of_range, taps};
 pub(crate) use common::{Common, Point, Window};
@@ -106,6 +105,7 @@ pub(crate) use subspace::{
     Ordered, SegmentStart, SubspaceErrors, SubspaceSums, joint_products, joint_taps, products_of_innovations,
     with_levels,
 };
+pub use thetahat_numerics::regression::Solver;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
 pub(crate) use vector_arx::{VectorArxEstimate, vector_arx, vector_arx_of_sums};

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 
 use thetahat_core::RstController;
 use thetahat_core::nalgebra::{Complex, Dyn};
+use thetahat_numerics::regression::{add_filtered, divide};
 
 use super::document::Loop;
 use super::plant::{Plant, trimmed};
 use crate::Error;
 use crate::model::Root;
 use crate::model::polynomial::{is_stable, product, roots};
-use crate::regression::{add_filtered, divide};
 use crate::respond::StepFigures;
 
 /// Frequencies at which L is looked at.

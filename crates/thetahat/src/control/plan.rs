@@ -7,6 +7,7 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{
     Covariance, LinearQuadratic, MinimumVariance, PlacementOrders, RstController, WantedPoles,
 };
+use thetahat_numerics::random::Random;
 
 use super::closed_loop::{Closed, closed_loop};
 use super::document::{Control, Polynomials, Robustness};
@@ -15,7 +16,6 @@ use crate::data::Offset;
 use crate::figures::short;
 use crate::model::polynomial::{is_stable, product, roots};
 use crate::model::{LinearModel, Model, PolynomialModel};
-use crate::random::Random;
 use crate::respond::Spread;
 use crate::{Document, Error};
 

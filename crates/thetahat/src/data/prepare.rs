@@ -2,9 +2,10 @@ use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
+use thetahat_numerics::regression::{sum, sum_above};
+
 use crate::Error;
 use crate::data::{Log, Offset};
-use crate::regression::{sum, sum_above};
 
 /// What is taken from each channel before a fit. A model speaks of deviations from it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -23,12 +23,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::product;
 
 use super::log::{check, median_step, steps};
 use super::{Channel, GAP, Interpolation, JITTER, Log};
 use crate::Error;
 use crate::figures::short;
-use crate::regression::product;
 
 /// Rows that resampling may give: beyond them a step was mistyped.
 const MOST_ROWS: f64 = 1e8;

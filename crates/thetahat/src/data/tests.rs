@@ -1,8 +1,9 @@
 //! Logs and what is done to them, against definitions.
 
+use thetahat_numerics::noise::Noise;
+
 use super::{Channel, Detrend, Interpolation, Log, Offset, Resample, Rows};
 use crate::Error;
-use crate::regression::noise::Noise;
 
 const NAN: f64 = f64::NAN;
 

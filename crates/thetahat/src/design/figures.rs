@@ -4,9 +4,9 @@ use std::slice;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::sum;
 
 use crate::inspect::{SpectrumPoint, excitation, order_with_mean};
-use crate::regression::sum;
 
 /// What a signal is as an input of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

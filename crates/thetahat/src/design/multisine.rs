@@ -14,10 +14,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlannerScalar};
 use thetahat_core::nalgebra::Complex;
-
-use crate::random::Random;
+use thetahat_numerics::fourier::{self, Fft};
+use thetahat_numerics::random::Random;
 
 /// Pairs of starts: one transform serves two real signals, as real and imaginary parts. The first start has Schroeder's phases.
 const PAIRS: u64 = 5;
@@ -33,9 +32,7 @@ const TAKEN: f64 = 8.0;
 /// above 0 and below P/2. O(P log P) for each of at most 1000 rounds from 10 starts, which run in parallel; which of them
 /// wins does not depend on that.
 pub(super) fn low_crest(lines: &[usize], period: usize, seed: u64) -> Vec<f64> {
-    // Without instruction sets of its own: what is found has the same bits on every processor.
-    let mut planner = FftPlannerScalar::new();
-    let (forward, inverse) = (planner.plan_fft_forward(period), planner.plan_fft_inverse(period));
+    let [forward, inverse] = fourier::portable(period);
     let of = |pair| {
         Search::new(lines, period, &forward, &inverse)
             .lowest([0, 1].map(|k| phases(lines.len(), seed, 2 * pair + k)))

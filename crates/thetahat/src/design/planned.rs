@@ -30,10 +30,10 @@
 use std::slice;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, add_filtered, divide};
 
 use crate::Error;
 use crate::model::{Orders, PolynomialModel};
-use crate::regression::{Lagged, Presample, Taps, add_filtered, divide};
 use crate::respond::until_negligible;
 
 /// Of a column's square, what the columns before it leave below this fraction is rounding.

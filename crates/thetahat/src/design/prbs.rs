@@ -10,7 +10,7 @@
 //! System Identification, 1989, section 5.3). With s(t) = 1 - 2 a(t) the sum over a period of L = 2^n - 1 is -1, and the
 //! autocorrelation (1/L) sum_t s(t) s(t + k) is 1 for k = 0 and -1/L for every other shift: that of white noise but for the mean.
 
-use crate::random::mixed;
+use thetahat_numerics::random::mixed;
 
 /// The shortest and the longest register.
 pub(super) const ORDERS: [u32; 2] = [2, 16];

@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
+use thetahat_numerics::random::Random;
+
 use super::multisine::low_crest;
 use super::prbs;
 use super::waveform::{SignalKind, Waveform};
 use crate::Error;
-use crate::random::Random;
 use crate::respond::logarithmic_frequencies;
 
 /// The most values of a signal, over all channels.

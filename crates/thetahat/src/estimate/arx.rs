@@ -3,12 +3,12 @@ use std::ops::Range;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, Dyn};
+use thetahat_numerics::regression::{ExtendedGram, Lagged, Presample, Regression, Taps, Unsolved};
 
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::estimate::{Estimate, Initial, Procedure};
 use crate::model::Orders;
-use crate::regression::{ExtendedGram, Lagged, Presample, Regression, Taps, Unsolved};
 
 impl Estimate {
     /// The estimate that a triangular factor holds, such as [`arx_factor`] gives or several of them merged.

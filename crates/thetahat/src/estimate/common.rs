@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::optimize::{Deadline, Monitor, Search, best_free, search};
+
 use super::prediction_error::is_determined;
 use super::predictor::{InitialCondition, Predictor};
 use super::start::candidates;
@@ -9,7 +11,6 @@ use super::stretches::energy;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::{Deadline, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
 
 /// A step that raises the log-likelihood by less than this fraction of one is not done.

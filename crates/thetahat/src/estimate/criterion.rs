@@ -8,19 +8,19 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DVector;
+use thetahat_numerics::regression::{
+    Lagged, Presample, Unsolved,
+    convex::{Failure, Fitting, Solved, peak},
+    sum,
+};
 
 use super::arx::{linear, out_of_range, rows, signals, taps, unsolved, with_past};
 use super::enough;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-pub use crate::regression::convex::Norm;
-use crate::regression::{
-    Lagged, Presample, Unsolved,
-    convex::{Failure, Fitting, Solved, peak},
-    sum,
-};
 use demands::Demands;
+pub use thetahat_numerics::regression::convex::Norm;
 
 /// A noise bound that the data meet to this is met.
 const BOUND_ROUNDING: f64 = 1e-9;

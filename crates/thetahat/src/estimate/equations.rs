@@ -9,14 +9,14 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::{
+    Algorithm, Deadline, Found, Monitor, Search, Step, Stopped, lowest, normal_number, search,
+};
 
 use crate::Error;
 use crate::model::{
     GreyBox,
     equations::{Scale, Unknown},
-};
-use crate::optimize::{
-    Algorithm, Deadline, Found, Monitor, Search, Step, Stopped, lowest, normal_number, search,
 };
 use crate::respond::{
     NisSummary,

@@ -36,6 +36,7 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{ComplexField, DVector};
+use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Search, Stopped, best_free, search};
 
 use super::arx::{out_of_range, rows, signals};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
@@ -49,7 +50,6 @@ use crate::model::{
     Orders, Structure,
     polynomial::{is_stable, multiply_out, roots},
 };
-use crate::optimize::{Deadline, Found, Monitor, Objective, Search, Stopped, best_free, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
 use likelihood::{InitialCondition, Likelihood};
 

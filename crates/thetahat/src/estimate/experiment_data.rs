@@ -2,6 +2,7 @@
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, Dyn};
+use thetahat_numerics::optimize::Objective;
 
 use super::arx::signals;
 use super::polynomials::Unusable;
@@ -11,7 +12,6 @@ use super::uncertainty::{Autoregression, autoregression, restricted};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::Objective;
 
 /// The data of some experiments.
 pub(crate) trait ExperimentData {

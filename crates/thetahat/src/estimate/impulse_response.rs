@@ -46,14 +46,14 @@ use faer::{Mat, Par, Spec};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::optimize::least;
+use thetahat_numerics::regression::{Lagged, gram};
 
 use super::arx::{enough, linear, out_of_range, resolved, signals, taps, with_past};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::least;
-use crate::regression::{Lagged, gram};
 
 /// The search for the largest likelihood ends where -2 ln L would fall by less than this.
 const TOLERANCE: f64 = 1e-7;

@@ -5,6 +5,8 @@ use std::slice::from_ref;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
+use thetahat_numerics::optimize::{Deadline, Stopped};
+use thetahat_numerics::regression::{Lagged, Presample, Taps};
 
 use super::arx::{arx, resolved, rows, signals};
 use super::start::noise::{Equation, Mixed, after};
@@ -18,8 +20,6 @@ use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::{Deadline, Stopped};
-use crate::regression::{Lagged, Presample, Taps};
 
 /// Corrections of a solution by its residuals.
 const CORRECTIONS: usize = 2;

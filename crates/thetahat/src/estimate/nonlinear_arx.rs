@@ -15,6 +15,7 @@ use faer::{Accum, Mat, Par};
 use rayon::prelude::*;
 use thetahat_core::Error as CoreError;
 use thetahat_core::nalgebra::DVector;
+use thetahat_numerics::regression::{Moments, Path, factor_rows, forward, product, sum_of_squares};
 
 pub(crate) use candidates::Candidates;
 use candidates::Products;
@@ -29,7 +30,6 @@ use super::{Criteria, InformationCriterion};
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::{Evaluator, Map, NonlinearArxModel, OutputMap, Parameter};
-use crate::regression::{Moments, Path, factor_rows, forward, product, sum_of_squares};
 
 /// Rows whose functions are in memory at once.
 const ROWS: usize = 512;

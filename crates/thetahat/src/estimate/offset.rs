@@ -38,6 +38,7 @@ use std::time::Instant;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::{Objective, best_free, predicted_decrease};
 
 use super::experiment_data::ExperimentData;
 use super::predictor::InitialCondition;
@@ -49,7 +50,6 @@ use crate::Error;
 use crate::data::Offset;
 use crate::estimate::Criteria;
 use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
-use crate::optimize::{Objective, best_free, predicted_decrease};
 pub(crate) use beside::Beside;
 pub(crate) use normal_equations::LinearProblem;
 pub(crate) use worth::pays;

@@ -2,8 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use crate::optimize::{Algorithm, Found, Objective, Search, Step, Stopped};
+use thetahat_numerics::optimize::{Algorithm, Found, Objective, Search, Step, Stopped};
 
 /// What a start led to.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

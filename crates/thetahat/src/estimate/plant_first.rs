@@ -19,6 +19,8 @@ mod shared;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::{Monitor, Search, best_free};
+use thetahat_numerics::regression::{sum, sum_of_squares};
 
 use super::arx::rows;
 use super::polynomials::Polynomials;
@@ -28,8 +30,6 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::InformationCriterion;
 use crate::model::Orders;
-use crate::optimize::{Monitor, Search, best_free};
-use crate::regression::{sum, sum_of_squares};
 
 /// Autoregressions behind a plant have this many coefficients at most.
 const LONGEST: usize = 10;

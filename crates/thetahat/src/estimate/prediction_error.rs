@@ -6,6 +6,10 @@ mod ranking;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use thetahat_numerics::optimize::{
+    Deadline, Found, Monitor, Objective, Search, Stopped, best_free, predicted_decrease, search,
+};
+use thetahat_numerics::regression::{Taps, condition};
 
 use super::arx::{arx, estimate_is_for_f, out_of_range, rows};
 use super::experiment_data::{ExperimentData, PredictionErrors};
@@ -17,10 +21,6 @@ use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
-use crate::optimize::{
-    Deadline, Found, Monitor, Objective, Search, Stopped, best_free, predicted_decrease, search,
-};
-use crate::regression::{Taps, condition};
 use crate::respond::{NOTHING_LEFT, are_worth};
 
 /// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.

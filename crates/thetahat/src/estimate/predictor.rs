@@ -47,13 +47,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
+use thetahat_numerics::regression::{Products, Taps, factor_rows, sum, sum_of_squares};
 
 use super::border::Border;
 use super::polynomials::{Polynomials, Unusable};
 use super::uncertainty::backward_filtered_products;
 use crate::data::{Record, measured};
 use crate::model::Orders;
-use crate::regression::{Products, Taps, factor_rows, sum, sum_of_squares};
 use section::Section;
 
 /// Samples from which threads pay for themselves.

@@ -20,13 +20,13 @@ mod tests;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::{Algorithm, Deadline, Found, Monitor, Search, Step, Stopped};
+use thetahat_numerics::regression::{Span, condition, sum_of_squares};
 
 use super::prediction_error::backward_products;
 use super::uncertainty::{Autoregression, coloured, restricted};
 use crate::Error;
 use crate::model::{Parts, ProcessStructure, is_covariance};
-use crate::optimize::{Algorithm, Deadline, Found, Monitor, Search, Step, Stopped};
-use crate::regression::{Span, condition, sum_of_squares};
 use crate::respond::process::HeldLog;
 use objective::ProcessObjective;
 pub(crate) use objective::{Background, ResponsePoints};

@@ -11,6 +11,9 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::optimize::{
+    Deadline, Found, Monitor, Objective, Progress, Search, Stopped, lowest, search,
+};
 
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use crate::Error;
@@ -18,7 +21,6 @@ use crate::data::JointRecord;
 use crate::model::{
     EntryCovariance, Sizes, StateSpace, across_coordinates, flat, is_stable, symmetric_eigen,
 };
-use crate::optimize::{Deadline, Found, Monitor, Objective, Progress, Search, Stopped, lowest, search};
 use errors::{Errors, Form, Unstable};
 
 /// The variance of errors, in squares of the outputs, below which nothing is left of them.

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 
 use oorandom::Rand64;
 use thetahat_core::nalgebra::{Complex, ComplexField};
+use thetahat_numerics::optimize::normal_number;
 
 use super::polynomials::Polynomials;
 use crate::model::{
     Orders,
     polynomial::{product, roots},
 };
-use crate::optimize::normal_number;
 
 /// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its angle.
 const SPREAD: f64 = 0.7;
@@ -24,7 +24,7 @@ const SMALLEST_ANGLE: f64 = 1e-3 * PI;
 /// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by factors
 /// on the distance 1 - |z| from the unit circle and on the angle; the others have new ones, these two numbers being
 /// uniform on a logarithmic scale, as the time constants and frequencies of plants are. A and B, which are linear
-/// once C, D and F are given, are left to [`best_linear`](crate::optimize::best_linear).
+/// once C, D and F are given, are left to [`best_linear`](thetahat_numerics::optimize::best_linear).
 pub(super) fn restarts(
     orders: &Orders,
     best: &[f64],

@@ -41,6 +41,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::{Deadline, Found, Monitor, Search, best_free, search};
 
 use super::arx::rows;
 use super::criterion::sparsity;
@@ -53,7 +54,6 @@ use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, Structure};
-use crate::optimize::{Deadline, Found, Monitor, Search, best_free, search};
 use crate::respond::NOTHING_LEFT;
 
 /// The median of |e| of normal errors, in standard deviations.

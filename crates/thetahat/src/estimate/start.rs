@@ -22,6 +22,8 @@ mod tests;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Complex, ComplexField};
+use thetahat_numerics::optimize::Deadline;
+use thetahat_numerics::regression::{Lagged, Presample, Taps, Unsolved};
 
 use super::arx::{enough, out_of_range, signals};
 use crate::Error;
@@ -30,8 +32,6 @@ use crate::model::{
     Orders,
     polynomial::{is_stable, multiply_out, roots},
 };
-use crate::optimize::Deadline;
-use crate::regression::{Lagged, Presample, Taps, Unsolved};
 
 /// Roots closer to the unit circle are moved away from it by this factor.
 const SHRINK: f64 = 0.999;

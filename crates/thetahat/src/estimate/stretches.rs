@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::regression::sum_of_squares;
+
 use crate::data::{JointRecord, Record, measured};
-use crate::regression::sum_of_squares;
 
 /// From so many samples on, starts see stretches of the record only.
 pub(crate) const LONG: usize = 1 << 18;

@@ -16,13 +16,13 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::optimize::normal;
 
 use super::refinement::RefinementOutcome;
 use super::stretches::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable, riccati};
-use crate::optimize::normal;
 pub(super) use data::SubspaceData;
 pub(crate) use innovations::products as products_of_innovations;
 pub(super) use joint::joint_columns;

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::noise::Noise;
+
 use super::{Estimate, arx, arx_factor};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::Initial;
 use crate::model::{Orders, polynomial::product};
-use crate::regression::noise::Noise;
 
 /// What made the data.
 struct Plant {

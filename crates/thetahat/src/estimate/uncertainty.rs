@@ -33,6 +33,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_squares};
 
 use holes::Holes;
 
@@ -40,7 +41,6 @@ use super::start::reduced::Factor;
 use super::start::stable;
 use crate::data::measured;
 use crate::model::polynomial::product;
-use crate::regression::{Lagged, Presample, Taps, divide_from, sum, sum_of_squares};
 
 /// The highest order of an autoregression of residuals.
 pub(super) const HIGHEST: usize = 10;

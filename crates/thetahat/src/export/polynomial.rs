@@ -15,7 +15,7 @@ use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, PolynomialModel};
 
-/// So many weights are subtracted one after the other by [`divide`](crate::regression); of more the sum is.
+/// So many weights are subtracted one after the other by [`divide`](thetahat_numerics::regression); of more the sum is.
 const ONE_BY_ONE: usize = 4;
 
 /// The program of a model.

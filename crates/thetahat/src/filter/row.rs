@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_core::{Action, Error, Innovation};
+use thetahat_numerics::distribution::chi_square_interval;
 
 use super::estimate::{StateEstimate, StateValues};
 use super::kind::{Filter, Kind, Sample};
 use super::model::StateModel;
-use crate::distribution::chi_square_interval;
 
 /// The numbers of one row.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -35,7 +35,7 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> C
     let scale = moments::scale([minimum, maximum].into_iter());
     let scaled: Vec<f64> = (0..count).map(|position| scale * all[row_of(position)]).collect();
     let mean = moments::mean(&scaled);
-    let square = crate::regression::sum(scaled.iter().map(|value| (value - mean).powi(2)));
+    let square = thetahat_numerics::regression::sum(scaled.iter().map(|value| (value - mean).powi(2)));
     quality.mean = Some((mean / scale).clamp(minimum, maximum));
     quality.standard_deviation = Some((square / count as f64).sqrt() / scale);
     let elapsed = |position: usize| match times {

@@ -1,9 +1,10 @@
 //! The steps of a clock.
 
+use thetahat_numerics::regression::sum;
+
 use super::Clock;
 use crate::Error;
 use crate::data::{GAP, JITTER, Regular, Times, shortest};
-use crate::regression::sum;
 
 /// A clock and what is wrong with it.
 #[derive(Debug, Clone, PartialEq)]

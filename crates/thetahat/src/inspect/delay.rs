@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::regression::{Lagged, LaggedMoments, Presample, Taps, sum_of_squares};
+
 use super::moments::samples;
 use super::{DelayEstimate, whitening};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{self, Initial, Kernel, Method};
 use crate::model::Orders;
-use crate::regression::{Lagged, LaggedMoments, Presample, Taps, sum_of_squares};
 use crate::select::{constant_pays, delays};
 
 /// The highest lag tried.

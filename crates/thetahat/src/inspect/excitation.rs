@@ -5,10 +5,10 @@ use std::slice;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
 use super::moments::{self, samples};
 use super::{Excitation, spectrum};
-use crate::regression::{Lagged, Presample, Taps, sum, sum_of_squares};
 
 /// The highest order tried.
 pub(super) const HIGHEST: usize = 50;

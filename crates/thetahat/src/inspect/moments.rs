@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::regression::sum;
+use thetahat_numerics::regression::sum;
 
 /// Below this fraction of its largest value, what a channel's mean leaves is rounding.
 const ROUNDING: f64 = 1e-13;

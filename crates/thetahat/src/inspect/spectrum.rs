@@ -3,10 +3,11 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use thetahat_numerics::fourier::PairTransform;
+use thetahat_numerics::regression::sum;
+
 use super::SpectrumPoint;
 use super::moments::samples;
-use crate::fourier::PairTransform;
-use crate::regression::sum;
 
 /// The longest window, in samples: it gives 513 frequencies.
 pub(super) const LONGEST: usize = 1024;

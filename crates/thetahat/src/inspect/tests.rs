@@ -1,12 +1,13 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::regression::{Presample, Taps, sum_of_squares};
+
 use super::clock::Ticks;
 use super::*;
 use crate::Error;
 use crate::data::{Channel, Interpolation, Log, Recording, Resample, Source, Times};
-use crate::regression::noise::Noise;
-use crate::regression::{Presample, Taps, sum_of_squares};
 use crate::validate::feedback::feedback;
 
 mod channels;

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, add_filtered};
 
 use super::moments::samples;
-use crate::regression::{Lagged, Presample, Taps, add_filtered};
 
 /// The highest order of an autoregression.
 pub(super) const HIGHEST: usize = 30;

@@ -1,11 +1,11 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
 use super::quantity::{Quantity, Root};
 use crate::Error;
 use crate::data::Offset;
-use crate::distribution::{student_factor, student_two_sided};
 use crate::model::{Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.

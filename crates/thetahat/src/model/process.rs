@@ -13,11 +13,11 @@ pub(crate) use structure::{MOST_POLES, Parts};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
 use super::fitted::{only, only_variance};
 use super::{OffsetCovariance, Parameter, Signal};
 use crate::Error;
-use crate::distribution::{student_factor, student_two_sided};
 
 /// A process in continuous time, with a [structure](ProcessStructure) from each input to the output:
 ///

@@ -4,17 +4,18 @@
 mod tests;
 mod warnings;
 
+use thetahat_numerics::distribution::chi_square_interval;
+use thetahat_numerics::optimize::{Monitor, Search};
+
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Log, Rows, Source, Split};
-use crate::distribution::chi_square_interval;
 use crate::estimate::{
     Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, Procedure, Question,
     equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
 };
 use crate::model::{EquationsModel, GreyBox, Model};
-use crate::optimize::{Monitor, Search};
 use crate::respond::{
     NisCount, NisSummary,
     equations::{EquationsOnLog, Experiment, Predictor, experiments, walk},

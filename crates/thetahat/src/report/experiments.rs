@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::Monitor;
 
 use super::Plan;
 use super::from_sums::report_of;
@@ -20,7 +21,6 @@ use crate::estimate::{
     Question, Task, enough, seen_by_starts,
 };
 use crate::model::{Orders, Structure};
-use crate::optimize::Monitor;
 use crate::select::{Choice, Focus};
 
 /// Experiments that others hold, in other processes or on other machines, as one model of all of them sees them: OE, ARMAX, Box-Jenkins,

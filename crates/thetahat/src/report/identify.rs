@@ -4,6 +4,8 @@ mod step_test;
 use std::ops::{ControlFlow, Range};
 
 use rayon::prelude::*;
+use thetahat_numerics::optimize::{Deadline, Monitor, Search};
+use thetahat_numerics::regression::{largest, sum};
 
 use super::fitted_rows::goes_through;
 use super::pending::{Open, OpenPolynomial, PendingEvaluation};
@@ -14,8 +16,6 @@ use super::warnings::warnings;
 use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
 use crate::model::{Orders, ProcessStructure, Quantity, Signal};
-use crate::optimize::{Deadline, Monitor, Search};
-use crate::regression::{largest, sum};
 use crate::respond::{Horizon, InitialCondition, innovations};
 use crate::select::{self, Choice, Focus, SelectedModel, Task};
 use crate::{Document, Error};

@@ -8,6 +8,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::{ControlFlow, Range};
 
+use thetahat_numerics::optimize::{Monitor, Stopped};
+
 use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
@@ -17,7 +19,6 @@ use crate::estimate::{
     nonlinear_arx::{Joint, joint},
 };
 use crate::model::{ChannelExpression, Map, Model, NonlinearArxModel, OutputMap, Regressor, Signal};
-use crate::optimize::{Monitor, Stopped};
 use crate::respond::{
     Horizon,
     nonlinear_arx::{NonlinearArxOnLog, no_number},
@@ -267,9 +268,9 @@ fn scales<'l>(
         let of =
             |values: &[f64]| segments.iter().map(|rows| &values[rows.clone()]).collect::<Vec<_>>().concat();
         let (values, size) = (of(own), of(raw).iter().fold(0.0_f64, |size, value| size.max(value.abs())));
-        let mean = crate::regression::sum(values.iter().copied()) / values.len() as f64;
-        let variance =
-            crate::regression::sum(values.iter().map(|value| (value - mean).powi(2))) / values.len() as f64;
+        let mean = thetahat_numerics::regression::sum(values.iter().copied()) / values.len() as f64;
+        let variance = thetahat_numerics::regression::sum(values.iter().map(|value| (value - mean).powi(2)))
+            / values.len() as f64;
         let spread = variance.sqrt();
         let varies = values.iter().any(|value| (value - mean).abs() > ROUNDING * size);
         if varies && !variance.is_normal() {

@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::ExtendedGram;
 
 use super::Plan;
 use super::from_sums::one_step;
@@ -24,7 +25,6 @@ use super::totals::Totals;
 use crate::data::{Log, Record, Rows, Source, digests};
 use crate::document::document_methods;
 use crate::estimate::{SegmentStart, joint_products, joint_taps, lagged_products};
-use crate::regression::ExtendedGram;
 use crate::respond::InitialCondition;
 use crate::validate::Fit;
 use crate::{Document, Error};

@@ -7,13 +7,14 @@ mod warnings;
 
 pub use response::fit_process_to_response;
 
+use thetahat_numerics::optimize::{Monitor, Search};
+
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Log, Offset, Rows, Source, Split};
 use crate::estimate::{Background, Criteria, Initial, Procedure, ProcessEstimate, least_free_run};
 use crate::model::{Model, OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
-use crate::optimize::{Monitor, Search};
 use crate::respond::process::{ProcessOnLog, held_logs};
 use crate::select::Focus;
 use crate::validate::Part;

@@ -7,14 +7,15 @@ mod warnings;
 
 use std::ops::{ControlFlow, RangeInclusive};
 
+use thetahat_numerics::optimize::{Monitor, Search};
+use thetahat_numerics::regression::{SAFE_NORMS, largest};
+
 use super::pending::{Open, PendingEvaluation};
 use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
 use crate::model::{Model, Quantity, Signal, StateSpaceModel};
-use crate::optimize::{Monitor, Search};
-use crate::regression::{SAFE_NORMS, largest};
 use crate::{Document, Error};
 pub(super) use estimated::{Estimated, by_sums, of_arx};
 

@@ -1,10 +1,11 @@
 //! What a report says where a log has a past, lacks one, or has holes.
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::{Channel, Log, Rows};
 use crate::estimate::{Initial, Procedure};
 use crate::model::{Model, Orders};
-use crate::regression::noise::Noise;
 use crate::respond::{Horizon, InitialCondition};
 use crate::validate::Part;
 

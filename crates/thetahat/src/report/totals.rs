@@ -5,11 +5,11 @@ use std::ops::Range;
 use faer::fx128;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::{extended_product, extended_sum};
 
 use super::identify::{ROUNDING, constant};
 use crate::Error;
 use crate::model::Orders;
-use crate::regression::{extended_product, extended_sum};
 
 /// What the pieces together say of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -4,6 +4,8 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+use thetahat_numerics::regression::sum;
+
 pub use document::{Comparison, Coverage, InSample, NoiseLevel, Validation};
 
 use super::Report;
@@ -14,7 +16,6 @@ use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
 use crate::estimate::{Criteria, Procedure};
 use crate::figures::{chance, fixed, number};
 use crate::model::{Model, Structure};
-use crate::regression::sum;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
 use crate::spectrum::MeasuredResponse;
 use crate::validate::{Fit, Relation, Residuals, nonlinearities, portmanteau};

@@ -1,11 +1,12 @@
 //! What a careful reader of a report should know, in plain words.
 
+use thetahat_numerics::optimize::Stopped;
+
 use super::fitted_rows::is_exact;
 use super::schema::Report;
 use crate::estimate::{Procedure, SearchOutcome};
 use crate::figures::{error, fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
-use crate::optimize::Stopped;
 use crate::select::{Grid, OrderRange};
 
 /// Condition numbers above this one are worth a warning.

@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
+use thetahat_numerics::random::Random;
+use thetahat_numerics::regression::{add_filtered, divide};
 
 use super::{InitialCondition, Response, check_inputs, simulate};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
-use crate::random::Random;
-use crate::regression::{add_filtered, divide};
 
 /// The most draws.
 const MOST: usize = 100_000;

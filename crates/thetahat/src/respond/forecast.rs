@@ -1,3 +1,5 @@
+use thetahat_numerics::regression::divide_from;
+
 use super::innovations::{driven, of_segments};
 use super::predict::{check_start, check_steps, deviations};
 use super::sensitivities::{Paths, student};
@@ -5,7 +7,6 @@ use super::{InitialCondition, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
-use crate::regression::divide_from;
 
 /// What a model expects after the last sample of a record.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,9 +3,9 @@ use std::f64::consts::{PI, TAU};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
+use thetahat_numerics::distribution::two_sided;
 
 use crate::Error;
-use crate::distribution::two_sided;
 use crate::model::{Block, Blocks, Gradient, Interval, PolynomialModel, Quantity, covariance};
 
 /// 95 % of chi-square for two degrees of freedom.

@@ -1,7 +1,8 @@
 //! Initial-condition responses: what a filter says of samples before the first, and the combination of them that fits best.
 
+use thetahat_numerics::regression::{Lagged, Presample, Taps, Unsolved, divide, sum};
+
 use crate::Error;
-use crate::regression::{Lagged, Presample, Taps, Unsolved, divide, sum};
 
 /// A response has died away when it is below this fraction of its largest value.
 const NEGLIGIBLE: f64 = 1e-20;

@@ -14,12 +14,13 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::regression::{add_filtered, divide, sum_of_squares};
+
 use super::initial_responses::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
 use super::{InitialCondition, NOTHING_LEFT, are_worth, check_inputs, history};
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::PolynomialModel;
-use crate::regression::{add_filtered, divide, sum_of_squares};
 
 /// The innovations of one segment.
 #[derive(Debug, Clone)]

@@ -20,13 +20,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
+use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
 use super::on_log::{OnLog, Tested};
 use super::predict::check_steps;
 use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
-use crate::distribution::{student_factor, student_two_sided};
 use crate::model::{NonlinearArxModel, Orders, PolynomialModel, RunError, Signal};
 use errors::Errors;
 pub(crate) use runner::within;

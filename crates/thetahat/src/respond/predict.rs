@@ -1,12 +1,13 @@
 use std::ops::Range;
 
+use thetahat_numerics::regression::{add_filtered, divide};
+
 use super::initial_responses::until_negligible;
 use super::innovations::{Innovations, innovations};
 use super::{InitialCondition, Response, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
-use crate::regression::{add_filtered, divide};
 
 /// Steps that a prediction or a forecast may look ahead: beyond them a number was mistyped.
 pub(super) const MOST_STEPS: usize = 1_000_000;

@@ -33,6 +33,7 @@
 //! sqrt(nu/(nu - 2)) of the scale.
 
 use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
+use thetahat_numerics::regression::{add_filtered, divide, divide_from, product};
 
 use super::innovations::{Basis, Impulses, Innovations, best, free_columns, innovations};
 use super::predict::{accumulated, disturbance_response, longest};
@@ -40,7 +41,6 @@ use super::{InitialCondition, check_inputs};
 use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
-use crate::regression::{add_filtered, divide, divide_from, product};
 
 /// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be told.
 const UNSEEN: f64 = 1e-20;

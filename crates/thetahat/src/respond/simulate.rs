@@ -1,5 +1,7 @@
 use std::ops::Range;
 
+use thetahat_numerics::regression::{add_filtered, divide, sum};
+
 use super::forecast::{Known, continuation};
 use super::initial_responses::{
     Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible,
@@ -9,7 +11,6 @@ use super::{InitialCondition, NOTHING_LEFT, Response, are_worth, check_inputs, h
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::PolynomialModel;
-use crate::regression::{add_filtered, divide, sum};
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///

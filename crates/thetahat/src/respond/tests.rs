@@ -9,13 +9,14 @@ mod transient;
 
 use std::ops::Range;
 
+use thetahat_numerics::noise::Noise;
+
 use super::{InitialCondition, Response, predict, simulate};
 use crate::data::Record;
 use crate::model::{
     Orders, PolynomialModel,
     polynomial::{inverse_series, product},
 };
-use crate::regression::noise::Noise;
 
 /// A(q) y(t) = sum_j B_j(q) u_j(t); `b` holds nk and the coefficients of each input.
 fn model(a: &[f64], b: &[(usize, &[f64])]) -> PolynomialModel {

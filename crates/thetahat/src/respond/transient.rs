@@ -1,10 +1,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, ComplexField};
+use thetahat_numerics::regression::{add_filtered, divide};
 
 use crate::Error;
 use crate::model::{Block, Blocks, Gradient, PolynomialModel, Quantity, covariance};
-use crate::regression::{add_filtered, divide};
 
 /// What is left of the slowest mode at the end of a response.
 const LEFT: f64 = 0.005;

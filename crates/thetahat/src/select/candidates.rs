@@ -1,12 +1,13 @@
 //! The models of a choice, and the samples that all of them are compared on.
 
+use thetahat_numerics::regression::{Presample, sum_of_squares};
+
 use super::Candidate;
 use super::linear::{Columns, Kept, Rows};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, Point, Window, drop_is_not_for_f, estimate_is_for_f};
 use crate::model::Orders;
-use crate::regression::{Presample, sum_of_squares};
 
 /// At most this many inputs: a Gram matrix of all their lags has to fit.
 pub(super) const MOST_INPUTS: usize = 100;

@@ -1,5 +1,7 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::optimize::{Deadline, Monitor, Search};
+
 use super::choice::{Choice, Path, Select};
 use super::focus::Focus;
 use super::selection::Selection;
@@ -8,7 +10,6 @@ use super::{automatic, compare, ranking};
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::Initial;
-use crate::optimize::{Deadline, Monitor, Search};
 
 /// Chooses the orders of a model. All models are compared on the same samples of the record; those of `validation` are for
 /// [`Select::Validation`]. Inputs are called `u1`, `u2`, ….

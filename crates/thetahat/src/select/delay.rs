@@ -17,6 +17,8 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::regression::LaggedMoments;
+
 use super::candidates::{MOST_INPUTS, SAMPLES, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
 use super::ranking::number;
@@ -26,7 +28,6 @@ use crate::data::Record;
 use crate::estimate::InformationCriterion;
 use crate::figures::fixed;
 use crate::model::Orders;
-use crate::regression::LaggedMoments;
 use crate::validate::feedback;
 
 /// Orders of the models: na, and input lags.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use thetahat_numerics::regression::Presample;
 
 use super::Task;
 use super::candidates::{Samples, Trial, rows, total};
@@ -11,7 +12,6 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Common, Point};
 use crate::model::Orders;
-use crate::regression::Presample;
 
 /// The linear models among those that have parameters, and all others.
 pub(super) fn parted(tried: &[Trial]) -> (Vec<usize>, Vec<usize>) {

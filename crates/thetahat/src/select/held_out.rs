@@ -5,6 +5,7 @@
 //! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
 
 use rayon::prelude::*;
+use thetahat_numerics::regression::sum;
 
 use super::candidates::{Samples, Trial, total};
 use super::folds::Folds;
@@ -15,7 +16,6 @@ use crate::model::{
     Orders, PolynomialModel, Structure,
     polynomial::{is_stable, roots},
 };
-use crate::regression::sum;
 use crate::respond::{Horizon, InitialCondition, Response, predict, simulate};
 
 /// A record is cut into this many blocks.

@@ -18,12 +18,12 @@
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use thetahat_numerics::regression::{Lagged, LaggedMoments, Presample, Taps, condition};
 
 use super::EXACT;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
-use crate::regression::{Lagged, LaggedMoments, Presample, Taps, condition};
 
 /// Above this condition number the Gram matrix is not exact enough.
 const MAXIMUM_CONDITION: f64 = 1e5;
@@ -142,7 +142,7 @@ impl Rows {
     pub(super) fn are_exact(&self) -> bool {
         let Self::Products(matrix, right, square, rows) = self else { return true };
         let norms = matrix.diagonal().map(f64::sqrt);
-        let safe = |norm: &f64| crate::regression::SAFE_NORMS.contains(norm);
+        let safe = |norm: &f64| thetahat_numerics::regression::SAFE_NORMS.contains(norm);
         if !norms.iter().chain([&square.sqrt()]).all(safe) {
             return false;
         }

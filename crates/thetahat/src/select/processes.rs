@@ -11,6 +11,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use rayon::prelude::*;
+use thetahat_numerics::optimize::Search;
+use thetahat_numerics::regression::sum;
 
 use super::candidates::total;
 use super::folds::Folds;
@@ -24,8 +26,6 @@ use crate::estimate::{
 };
 use crate::figures::fixed;
 use crate::model::{Orders, ProcessModel, ProcessStructure};
-use crate::optimize::Search;
-use crate::regression::sum;
 use crate::respond::Horizon;
 use crate::respond::process::{HeldLog, at_rest};
 

@@ -152,7 +152,7 @@ fn held_out(record: &Record<'_>, options: &SubspaceOptions, order: usize) -> Opt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::regression::noise::Noise;
+    use thetahat_numerics::noise::Noise;
 
     fn candidate(blocks: f64, onward: f64) -> StateSpaceCandidate {
         let held_out = Some(HeldOut { blocks, onward, unpunished: blocks, unstable: 0, refits: BLOCKS });

@@ -1,10 +1,11 @@
+use thetahat_numerics::optimize::{Deadline, Monitor, Search};
+
 use super::choice::Select;
 use super::focus::Focus;
 use super::selection::Selection;
 use crate::data::Record;
 use crate::estimate::Initial;
 use crate::model::Orders;
-use crate::optimize::{Deadline, Monitor, Search};
 
 /// What a choice is made from.
 #[derive(Clone, Copy)]

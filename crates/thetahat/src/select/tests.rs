@@ -9,13 +9,14 @@ mod searched;
 
 use std::ops::{ControlFlow, Range};
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::{Deadline, Monitor, Search};
+
 use super::*;
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::Initial;
 use crate::model::{Orders, Structure};
-use crate::optimize::{Deadline, Monitor, Search};
-use crate::regression::noise::Noise;
 
 /// numerator/denominator applied to a signal from rest.
 fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {

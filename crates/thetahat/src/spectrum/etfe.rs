@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use thetahat_numerics::fourier::PairTransform;
+
 use super::estimate::{Bands, EMPTY, Empty, Estimate, Found, Line};
 use super::plan::Method;
 use super::signals::Signals;
 use crate::Error;
-use crate::fourier::PairTransform;
 
 /// The empirical transfer function estimate (Ljung 1999, section 6.3), at the lines of the longest segment:
 ///

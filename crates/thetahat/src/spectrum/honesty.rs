@@ -1,7 +1,8 @@
 //! Whether bands hold what they say: what smoothing hides shows when the resolution is doubled.
 
+use thetahat_numerics::distribution::{binomial_mid_p, chi_square_tail};
+
 use super::estimate::Line;
-use crate::distribution::{binomial_mid_p, chi_square_tail};
 
 /// Of an estimate without bias this part of the points lies outside by chance.
 const CHANCE: f64 = 0.05;

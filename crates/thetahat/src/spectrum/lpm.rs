@@ -4,12 +4,12 @@ use std::f64::consts::TAU;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
+use thetahat_numerics::fourier::PairTransform;
 
 use super::estimate::{Bands, EMPTY, Empty, Estimate, Found, Line};
 use super::plan::Method;
 use super::signals::Signals;
 use crate::Error;
-use crate::fourier::PairTransform;
 
 /// Coefficients of each polynomial: those of degree 2.
 const TERMS: usize = 3;

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::fourier::{PairTransform, suitable};
+
 use super::signals::Signals;
-use crate::fourier::{PairTransform, suitable};
 
 /// What repeats itself changes by no more than this fraction of its power.
 pub(super) const REPEATS: f64 = 0.01;

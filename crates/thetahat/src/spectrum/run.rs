@@ -1,6 +1,8 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use thetahat_numerics::distribution::student_two_sided;
+
 use super::estimate::{Bands, Empty, Estimate, Found, Line};
 use super::honesty::{self, Outside};
 use super::plan::{Method, SpectrumPlan};
@@ -8,7 +10,6 @@ use super::response::{BandQuality, MeasuredResponse, NoisePoint};
 use super::signals::Signals;
 use super::{etfe, lpm, sines, spa, welch};
 use crate::data::{Log, Rows, Source};
-use crate::distribution::student_two_sided;
 use crate::figures::{fixed, short};
 use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::validate::feedback::feedback;

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::Complex;
+use thetahat_numerics::fourier::PairTransform;
 
 use super::estimate::{Bands, Estimate, Found, Line};
 use super::periods::{Pieces, repeats};
@@ -11,7 +12,6 @@ use super::plan::Method;
 use super::signals::Signals;
 use crate::Error;
 use crate::figures::{fixed, short};
-use crate::fourier::PairTransform;
 
 /// Lines with less than this fraction of the power of an input's largest are not of its sines.
 const FAINT: f64 = 1e-4;

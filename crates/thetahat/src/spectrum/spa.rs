@@ -3,13 +3,13 @@
 use std::f64::consts::PI;
 
 use thetahat_core::nalgebra::Complex;
+use thetahat_numerics::fourier::{PairTransform, suitable};
 
 use super::estimate::{Bands, CrossSpectra, Estimate, Line, pairs};
 use super::honesty;
 use super::plan::{Estimator, Method};
 use super::signals::Signals;
 use crate::Error;
-use crate::fourier::{PairTransform, suitable};
 
 /// The shortest of the windows that are tried, in lags.
 const SHORTEST: usize = 16;

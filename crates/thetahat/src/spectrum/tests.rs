@@ -1,10 +1,10 @@
 use std::f64::consts::{PI, TAU};
 
 use thetahat_core::nalgebra::Complex;
+use thetahat_numerics::noise::Noise;
 
 use super::*;
 use crate::data::{Channel, Log};
-use crate::regression::noise::Noise;
 use crate::respond::FrequencyPoint;
 use crate::{Document, Error};
 

@@ -4,13 +4,13 @@ use std::f64::consts::{PI, TAU};
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::Complex;
+use thetahat_numerics::fourier::PairTransform;
+use thetahat_numerics::regression::sum_of_squares;
 
 use super::estimate::{Bands, CrossSpectra, Estimate, Line, pairs};
 use super::plan::{Estimator, Method};
 use super::signals::Signals;
 use crate::Error;
-use crate::fourier::PairTransform;
-use crate::regression::sum_of_squares;
 
 /// Windows that one thread adds up: their sums are folded in order.
 const BLOCK: usize = 64;

@@ -2,12 +2,13 @@
 
 use std::ops::ControlFlow;
 
+use thetahat_numerics::optimize::Search;
+
 use super::document::{FittedProcess, Shape, Step};
 use crate::Error;
 use crate::data::{Log, Offset, Rows};
 use crate::estimate::{Background, ProcessEstimate, least_free_run};
 use crate::model::{Parameter, ProcessModel, ProcessStructure, Quantity};
-use crate::optimize::Search;
 use crate::respond::process::held_logs;
 
 /// The structure for the shape that most responses have, the plainest of those that are as many.

@@ -3,9 +3,10 @@
 mod refusals;
 mod spread;
 
+use thetahat_numerics::random::Random;
+
 use super::{StepFigure, StepMethod, StepTest, StepTestPlan, step_test};
 use crate::data::{Channel, Log};
-use crate::random::Random;
 
 /// A log with a column of times.
 fn timed(time: &[f64], u: Vec<f64>, y: Vec<f64>) -> Log {

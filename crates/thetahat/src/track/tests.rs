@@ -9,13 +9,13 @@ mod state;
 use thetahat_core::nalgebra::Dyn;
 use thetahat_core::{Action, Chart, Forgetting, InputOrders, RecursiveArmax, RecursiveArx};
 use thetahat_core::{ArmaxMethod, ArmaxOrders, ArxOrders};
+use thetahat_numerics::noise::Noise;
 
 use super::*;
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Initial, arx};
 use crate::model::Orders;
-use crate::regression::noise::Noise;
 
 /// A log of y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u1(t-1) + 0.5 u1(t-2) - u2(t) + e(t) + c e(t-1), with e uniform in -size … size.
 pub(super) fn log(rows: usize, size: f64, c: f64, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {

@@ -29,11 +29,11 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, SMatrix, SVector};
+use thetahat_numerics::distribution::chi_square_tail;
+use thetahat_numerics::regression::{Lagged, Presample, Regression, Taps, add_filtered, sum_of_squares};
 
-use crate::distribution::chi_square_tail;
 use crate::figures::fixed;
 use crate::model::{Orders, PolynomialModel, Root};
-use crate::regression::{Lagged, Presample, Regression, Taps, add_filtered, sum_of_squares};
 
 /// The orders of the model that gives the innovations, the first that the data determine.
 const ORDERS: [usize; 4] = [10, 5, 2, 1];

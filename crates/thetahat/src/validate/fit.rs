@@ -3,9 +3,9 @@ use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::{differences, squares_above, sum_above};
 
 use crate::data::Rows;
-use crate::regression::{differences, squares_above, sum_above};
 use crate::respond::{Horizon, InitialCondition, Response};
 
 /// What rows serve for.

@@ -26,14 +26,14 @@
 //! lacks dynamics and the input predicts itself: what speaks for feedback alone is in `feedback`.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::distribution::{chi_square_tail, two_sided};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, sum_of_squares};
 
 use super::feedback::follows;
 use super::moments::{Column, Moments, Traces, columns, eigen};
 use super::verdict::{Independence, Test};
 use super::whiteness::chi_square;
-use crate::distribution::{chi_square_tail, two_sided};
 use crate::estimate::{Autoregression, backward_filtered_products};
-use crate::regression::{Lagged, Presample, Taps, sum_of_squares};
 
 /// Directions in which an input has less than the energy of this many of its samples are left out: a sum of few errors is not
 /// normal, and where an input is not rich they are no more than its ends.

@@ -14,10 +14,10 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
+use thetahat_numerics::regression::{Products, Taps, add_filtered, divide, sum};
 
 use crate::data::Record;
 use crate::model::PolynomialModel;
-use crate::regression::{Products, Taps, add_filtered, divide, sum};
 use crate::respond::Innovations;
 
 /// A signal that is this close to its mean, as a fraction of it, is constant up to rounding.

@@ -13,10 +13,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
+use thetahat_numerics::distribution::chi_square_tail;
 
 use super::verdict::Test;
 use crate::data::Record;
-use crate::distribution::chi_square_tail;
 use crate::respond::Innovations;
 
 /// The longest lag.

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_numerics::distribution::chi_square_tail;
+use thetahat_numerics::regression::sum;
 
 use super::verdict::Test;
 use super::whiteness::pairs;
-use crate::distribution::chi_square_tail;
-use crate::regression::sum;
 use crate::respond::Innovations;
 
 /// The portmanteau test of the residuals e of l outputs: with C_h = 1/N sum e(t) e(t-h)', e less their means,

@@ -4,16 +4,16 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::distribution::two_sided;
+use thetahat_numerics::regression::{Taps, sum_of_squares};
 
 use super::independence::{Parameters, Setting, independence};
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::verdict::{Anderson, Independence, Test};
 use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
 use crate::data::Record;
-use crate::distribution::two_sided;
 use crate::estimate::autoregression;
 use crate::model::PolynomialModel;
-use crate::regression::{Taps, sum_of_squares};
 use crate::respond::Innovations;
 
 /// Fewer samples than this, and one for each parameter that was fitted to them, say nothing.

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::distribution::{outside as events, two_sided};
+use thetahat_numerics::noise::Noise;
 
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::residuals::Untestable;
@@ -10,10 +12,8 @@ use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, past
 use super::*;
 use crate::Error;
 use crate::data::Record;
-use crate::distribution::{outside as events, two_sided};
 use crate::estimate::{Initial, arx, autoregression};
 use crate::model::{Orders, PolynomialModel, Signal};
-use crate::regression::noise::Noise;
 use crate::respond::{InitialCondition, innovations};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + e(t).
@@ -247,7 +247,7 @@ fn past_errors_are_in_psi_as_the_model_has_it() {
     let record = Record::new(&y, vec![&u]).unwrap();
     let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
     let traces = Traces::new(&model, &record, &found, false);
-    let error = crate::regression::Taps { signal: Traces::ERROR, first: 1, count: 6, sign: 1.0 };
+    let error = thetahat_numerics::regression::Taps { signal: Traces::ERROR, first: 1, count: 6, sign: 1.0 };
     let taps = [&traces.psi[..], &[error]].concat();
     let moments = Moments::new(&traces, &taps);
     let square: f64 = traces.signal(Traces::ERROR).iter().map(|e| e * e).sum();

@@ -26,12 +26,12 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, divide};
 
 use super::moments::eigen;
 use super::verdict::{Anderson, AndersonLevel, Test};
-use crate::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
 use crate::model::{PolynomialModel, polynomial::is_stable};
-use crate::regression::{Lagged, Presample, Taps, divide};
 
 /// Directions of which the fit has left less than this fraction say nothing.
 const FREE: f64 = 0.05;

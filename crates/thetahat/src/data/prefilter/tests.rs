@@ -1,6 +1,7 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::Channel;
-use crate::regression::noise::Noise;
 
 const STEP: f64 = 0.01;
 

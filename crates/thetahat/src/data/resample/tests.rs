@@ -1,7 +1,8 @@
 use std::f64::consts::TAU;
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
-use crate::regression::noise::Noise;
 
 const RECORDED: f64 = 1e-3;
 const STEP: f64 = 0.01;

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::DVector;
+use thetahat_numerics::regression::convex::{Fitting, Limit};
 
 use super::{ConvexFit, GainBound, check_range};
 use crate::Error;
 use crate::model::Orders;
-use crate::regression::convex::{Fitting, Limit};
 
 /// An end of a limit is active if a move of the predictions by this part of the residuals' RMS could reach it.
 const ACTIVE: f64 = 1e-8;

@@ -6,10 +6,10 @@ mod refusals;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::noise::Noise;
 
 use super::*;
 use crate::estimate::{Initial, arx::arx};
-use crate::regression::noise::Noise;
 use reference::{Reference, box_of_vertices, errors, norm_of, table};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + 0.8 u(t-1) + 0.3 u(t-2) + e(t), e being `size` times what `error` makes of uniform

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
+use thetahat_numerics::optimize::Objective;
 
 use super::message::{AboutErrors, Asked, Factor, Found, ModelErrors, Point, Sums};
 use super::{Distributed, Holders};
@@ -13,7 +14,6 @@ use crate::estimate::polynomials::{Polynomials, Unusable};
 use crate::estimate::predictor::InitialCondition;
 use crate::estimate::uncertainty::{Autoregression, ErrorProducts, HIGHEST};
 use crate::model::Orders;
-use crate::optimize::Objective;
 
 /// The prediction errors of experiments that others hold.
 pub(crate) struct DistributedErrors<'e> {

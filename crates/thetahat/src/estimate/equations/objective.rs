@@ -16,9 +16,10 @@
 //! The search stops when the predicted decrease is below the tolerance times max(N, sum e^2/S), N the elements that were measured. That
 //! is 2 V without its logarithms, which may be of either sign.
 
+use thetahat_numerics::optimize::{Objective, StepRules};
+
 use super::likelihood::{Likelihood, Slopes};
 use crate::model::{GreyBox, equations::Scale};
-use crate::optimize::{Objective, StepRules};
 use crate::respond::equations::Failure;
 
 /// -2 ln L as a function of the variables z.

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix};
+use thetahat_numerics::optimize::{Objective, normal};
+use thetahat_numerics::regression::{condition, divide, divide_from};
 
 use super::kalman::{Filter, Process};
 use crate::data::Record;
@@ -11,8 +13,6 @@ use crate::estimate::{
     polynomials::{Polynomials, Unusable},
 };
 use crate::model::{Orders, polynomial::is_stable};
-use crate::optimize::{Objective, normal};
-use crate::regression::{condition, divide, divide_from};
 
 /// What the response to the inputs starts from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

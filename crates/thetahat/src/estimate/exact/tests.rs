@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Algorithm;
 
 use super::*;
 use crate::data::{Channel, Detrend, Log};
 use crate::estimate::{Constant, Method};
-use crate::optimize::Algorithm;
-use crate::regression::noise::Noise;
 use crate::report::{Plan, identify};
 
 /// An ARMA model of a log as statsmodels has it.

@@ -1,8 +1,8 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::noise::Noise;
 
 use super::*;
 use crate::estimate::{Method, estimate};
-use crate::regression::noise::Noise;
 
 /// Two inputs, y(t) = sum 0.7^i u1(t-i) - 0.5 u2(t-1) + e(t).
 fn record(rows: usize, spread: f64) -> [Vec<f64>; 3] {
@@ -22,7 +22,12 @@ fn sums(taps: [usize; 2]) -> (Mat<f64>, Vec<f64>, f64, usize) {
     let orders = Orders::arx(0, &taps, &[0, 0]).unwrap();
     let signals: Vec<&[f64]> = vec![&y, &u, &v];
     let segments: Vec<_> = std::iter::once(0..200).collect();
-    let lagged = Lagged::new(&signals, super::taps(&orders), &segments, crate::regression::Presample::Drop);
+    let lagged = Lagged::new(
+        &signals,
+        super::taps(&orders),
+        &segments,
+        thetahat_numerics::regression::Presample::Drop,
+    );
     let (found, cross, energy) = gram(&lagged);
     let size = cross.len();
     (Mat::from_fn(size, size, |i, j| found[(i, j)]), cross.as_slice().to_vec(), energy, lagged.rows())

@@ -1,11 +1,12 @@
 //! Consistency where least squares is biased, intervals that cover, and identities.
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Search;
+use thetahat_numerics::regression::add_filtered;
+
 use super::*;
 use crate::estimate::{Method, estimate};
 use crate::model::polynomial::product;
-use crate::optimize::Search;
-use crate::regression::add_filtered;
-use crate::regression::noise::Noise;
 
 /// (numerator/denominator) signal from rest.
 fn response(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {

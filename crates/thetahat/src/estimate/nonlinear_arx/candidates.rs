@@ -1,9 +1,9 @@
 //! The functions that a choice is made from, and the sums that it needs of them.
 
 use faer::Mat;
+use thetahat_numerics::regression::{Moments, Monomials};
 
 use crate::model::Map;
-use crate::regression::{Moments, Monomials};
 
 /// Functions to choose from.
 #[derive(Debug, Clone)]

@@ -2,13 +2,13 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::{Algorithm, Stopped};
+use thetahat_numerics::regression::ChosenTerm;
 
 use super::candidates::Candidates;
 use crate::Error;
 use crate::data::{Log, Rows};
 use crate::model::NonlinearArxModel;
-use crate::optimize::{Algorithm, Stopped};
-use crate::regression::ChosenTerm;
 use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 

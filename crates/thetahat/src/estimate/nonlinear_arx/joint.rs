@@ -1,10 +1,10 @@
 //! One model of several outputs, of which each was fitted alone.
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::regression::product;
 
 use super::{Samples, Solved};
 use crate::model::{Evaluator, NonlinearArxModel, Signal};
-use crate::regression::product;
 
 /// The model of all outputs, and what its errors are.
 #[derive(Debug)]

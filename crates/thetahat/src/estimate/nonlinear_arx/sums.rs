@@ -1,10 +1,11 @@
 //! Products of regressors from their sums alone: the rows are gone.
 
+use thetahat_numerics::regression::{Column, DividedMonomials, ExtendedGram, Unsolved, forward};
+
 use super::candidates::Candidates;
 use super::{Count, Solved, TermStep, TermsOutcome, check, is_dependent, too_few};
 use crate::Error;
 use crate::model::{Map, NonlinearArxModel, OutputMap, Parameter};
-use crate::regression::{Column, DividedMonomials, ExtendedGram, Unsolved, forward};
 
 /// The least-squares solution of products of the regressors of `head`, a model of one output but its functions, from sums of deviations in
 /// the signals' own units; and how the products were chosen among `candidates`: of `most` steps as many as `count` says.

@@ -7,6 +7,7 @@ mod tests;
 
 use rayon::prelude::*;
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Search, best_linear, lowest, search};
 
 use self::objective::RunErrors;
 pub(crate) use self::starts::Units;
@@ -15,7 +16,6 @@ use super::{Chosen, Count, RunFigures, Samples, Solved, TermStep, TrainingOutcom
 use crate::Error;
 use crate::figures::short;
 use crate::model::{Activation, Map, NonlinearArxModel, Parameter, is_covariance};
-use crate::optimize::{Deadline, Found, Monitor, Objective, Search, best_linear, lowest, search};
 use crate::respond::Horizon;
 
 /// Iterations one step ahead, and over windows, before those of longer runs.

@@ -3,13 +3,14 @@
 //! A column of ones is among those whose products were summed, so that the constant, what it is worth, and what is open of an offset
 //! that was taken before follow as they do from a record.
 
+use thetahat_numerics::regression::{Column, ExtendedGram};
+
 use super::super::impulse_response::of_products;
 use super::super::{Estimate, Initial, Kernel, arx};
 use super::worth::is_worth;
 use super::{Beside, Constant, Fitted, wanted};
 use crate::Error;
 use crate::model::{OffsetCovariance, Orders};
-use crate::regression::{Column, ExtendedGram};
 
 /// Where y(t) stands.
 const TARGET: usize = 1;

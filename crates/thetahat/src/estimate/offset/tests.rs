@@ -1,6 +1,7 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::{Channel, Log, Record};
-use crate::regression::noise::Noise;
 
 /// y(t) = 1.2 y(t-1) - 0.4 y(t-2) + 0.5 u(t-1) + 0.3 + 0.01 t + 0.1 e(t).
 fn signals(seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {

@@ -1,13 +1,14 @@
 //! Whether a constant is worth its parameter.
 
+use thetahat_numerics::optimize::{Objective, best_free};
+use thetahat_numerics::regression::{Presample, sum, sum_above};
+
 use super::super::arx::with_past;
 use super::super::experiment_data::{ExperimentData, PredictionErrors};
 use super::super::prediction_error::predictor_of;
 use super::super::{Estimate, Initial, Norm, Procedure, arx};
 use crate::data::Record;
 use crate::model::Orders;
-use crate::optimize::{Objective, best_free};
-use crate::regression::{Presample, sum, sum_above};
 
 /// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
 const DEPENDENT: f64 = 1e-9;

@@ -7,6 +7,9 @@ use std::ops::Range;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
+use thetahat_numerics::optimize::{
+    Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search,
+};
 
 use super::super::arx::{arx, rows};
 use super::super::border::Border;
@@ -24,7 +27,6 @@ use crate::model::{
     Orders,
     polynomial::{multiply_out, roots},
 };
-use crate::optimize::{Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search};
 use crate::respond::{NOTHING_LEFT, are_worth};
 
 /// Starts have poles inside this circle.

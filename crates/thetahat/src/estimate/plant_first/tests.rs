@@ -1,7 +1,8 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::estimate::{Method, estimate, estimate_of_channels};
 use crate::model::PolynomialModel;
-use crate::regression::noise::Noise;
 use crate::respond::{InitialCondition, simulate};
 
 fn method(plant_first: bool) -> Method {

@@ -7,6 +7,8 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use thetahat_numerics::optimize::{Search, best_free};
+
 use super::{Job, Problem};
 use crate::Error;
 use crate::data::Record;
@@ -18,7 +20,6 @@ use crate::estimate::{
     stretches::{filled, stretches},
 };
 use crate::model::Orders;
-use crate::optimize::{Search, best_free};
 
 /// How many starts of a smaller model are followed for how many iterations: near enough to its optimum.
 const ROUNDS: [(usize, usize); 2] = [(3, 3), (1, 8)];

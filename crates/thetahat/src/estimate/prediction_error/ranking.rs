@@ -6,6 +6,7 @@
 //! Marquardt, the promising ones after some more.
 
 use rayon::prelude::*;
+use thetahat_numerics::optimize::{Algorithm, Found, Search, best_free, best_linear, predicted_decrease};
 
 use super::nested::thinned;
 use super::{Job, Problem, TrackStart, hopeless};
@@ -16,7 +17,6 @@ use crate::estimate::predictor::InitialCondition;
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
 use crate::estimate::stretches::filled;
-use crate::optimize::{Algorithm, Found, Search, best_free, best_linear, predicted_decrease};
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;

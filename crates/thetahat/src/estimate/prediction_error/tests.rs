@@ -1,9 +1,10 @@
 //! Searches against one another, and what they say when something is wrong.
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::{Algorithm, Step};
+
 use super::*;
 use crate::estimate::Procedure;
-use crate::optimize::{Algorithm, Step};
-use crate::regression::noise::Noise;
 
 /// The response of numerator/denominator from rest.
 fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {

@@ -1,6 +1,6 @@
 //! Huber's loss: rho(e) = e^2/2 up to a bound, linear beyond.
 
-use crate::regression::sum;
+use thetahat_numerics::regression::sum;
 
 /// 2 sum rho(e).
 pub(super) fn cost(errors: &[f64], bound: f64) -> f64 {

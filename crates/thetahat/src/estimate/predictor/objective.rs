@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::optimize::Objective;
+
 use super::Predictor;
 use crate::estimate::polynomials::Unusable;
-use crate::optimize::Objective;
 
 impl Objective for Predictor<'_> {
     type Refusal = Unusable;

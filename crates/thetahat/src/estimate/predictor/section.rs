@@ -3,12 +3,14 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::normal;
+use thetahat_numerics::regression::{
+    Interior, add_filtered, divide, divide_together, product, sum_of_squares,
+};
 
 use super::{Column, Layout, loss};
 use crate::data::Record;
 use crate::estimate::polynomials::Polynomials;
-use crate::optimize::normal;
-use crate::regression::{Interior, add_filtered, divide, divide_together, product, sum_of_squares};
 
 /// The fraction of a initial-condition response, squared, below which what is left of it is rounding.
 const UNSEEN: f64 = 1e-22;

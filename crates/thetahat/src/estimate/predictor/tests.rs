@@ -1,8 +1,9 @@
 //! Errors, gradients and Gram matrices against their definitions.
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::model::polynomial::product;
-use crate::regression::noise::Noise;
 
 /// A stable monic polynomial.
 fn stable(order: usize, noise: &mut Noise) -> Vec<f64> {

@@ -1,10 +1,11 @@
 //! Errors that count by their squares up to a bound, and linearly beyond: sums with weights.
 
+use thetahat_numerics::regression::product;
+
 use super::loss::weight;
 use super::section::Section;
 use super::{Layout, Predictor};
 use crate::data::Record;
-use crate::regression::product;
 
 impl Predictor<'_> {
     /// Lets errors count linearly from a bound on: the cost is 2 sum rho(e), rho(e) = e^2/2 up to the bound d and

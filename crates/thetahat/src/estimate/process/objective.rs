@@ -4,10 +4,11 @@ mod signals;
 
 use std::ops::Range;
 
+use thetahat_numerics::optimize::Objective;
+use thetahat_numerics::regression::{Span, product, sum, sum_of_squares};
+
 use crate::Error;
 use crate::model::{Parts, ProcessStructure};
-use crate::optimize::Objective;
-use crate::regression::{Span, product, sum, sum_of_squares};
 use crate::respond::process::{
     HeldLog, free_sensitivities, modes, response_slopes, responses, run, sensitivities,
 };

@@ -21,11 +21,11 @@
 //! Automatic Control 8, 1963) with instruments. Several inputs are fitted to what the others leave, in turn.
 
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
+use thetahat_numerics::optimize::Deadline;
+use thetahat_numerics::regression::{Span, product, sum_of_squares};
 
 use super::objective::{ProcessObjective, spread};
 use crate::model::{Parts, ProcessStructure, polynomial};
-use crate::optimize::Deadline;
-use crate::regression::{Span, product, sum_of_squares};
 
 /// Rates that the first filters have, and dead times, from the shortest to the longest that are looked at.
 const RATES: usize = 8;

@@ -1,10 +1,11 @@
 //! Where searches for a process start: a grid for one lag, then one lag more after the other.
 
+use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Search, search};
+
 use super::objective::{ProcessObjective, spread};
 use super::refined;
 use crate::Error;
 use crate::model::ProcessStructure;
-use crate::optimize::{Deadline, Found, Monitor, Objective, Search, search};
 
 /// Time constants and dead times of the grid.
 const TIME_CONSTANTS: usize = 8;

@@ -1,10 +1,11 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Search;
+
 use super::{Background, least_free_run};
 use crate::Error;
 use crate::model::ProcessStructure;
-use crate::optimize::Search;
-use crate::regression::noise::Noise;
 use crate::respond::process::{HeldLog, run, sensitivities};
 
 /// A clock that no step fits twice, and an input that moves with it.

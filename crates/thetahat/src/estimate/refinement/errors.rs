@@ -3,11 +3,11 @@
 use faer::linalg::matmul::{matmul, triangular};
 use faer::{Accum, MatMut, MatRef, Par};
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
+use thetahat_numerics::optimize::{Objective, normal};
 
 use super::Refine;
 use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable};
-use crate::optimize::{Objective, normal};
 use crate::respond::state_space::Recursion;
 
 /// Rows whose sources are made at once.

@@ -1,9 +1,10 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::optimize::Stopped;
+
 use super::*;
 use crate::estimate::subspace::tests::{Run, distance, plant};
 use crate::estimate::{SubspaceOptions, Weighting, subspace};
-use crate::optimize::Stopped;
 
 /// A record of the plant in two segments, a start from a subspace method with levels that are off, and what is looked for.
 fn start(record: &JointRecord<'_>, weighting: Weighting) -> Result<RefinementStart, Error> {

@@ -2,9 +2,10 @@
 
 use std::ops::ControlFlow;
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::estimate::{ConvexFit, Method, Norm, estimate};
-use crate::regression::noise::Noise;
 
 fn fitted(record: &Record<'_>, orders: &Orders, loss: Loss) -> (Estimate, RobustOutcome) {
     let method = Method::Robust(Robust {
@@ -32,13 +33,13 @@ impl Plant<'_> {
     fn run(&self, u: &[f64], e: &[f64]) -> Vec<f64> {
         let filtered = |above: &[f64], below: &[f64], x: &[f64]| {
             let mut y = vec![0.0; x.len()];
-            crate::regression::add_filtered(&mut y, &(0..x.len()), above, x, 0);
-            crate::regression::divide(below, &mut y);
+            thetahat_numerics::regression::add_filtered(&mut y, &(0..x.len()), above, x, 0);
+            thetahat_numerics::regression::divide(below, &mut y);
             y
         };
         let (driven, noise) = (filtered(self.b, self.f, u), filtered(self.c, self.d, e));
         let mut y: Vec<f64> = driven.iter().zip(noise).map(|(x, v)| x + v).collect();
-        crate::regression::divide(self.a, &mut y);
+        thetahat_numerics::regression::divide(self.a, &mut y);
         y
     }
 }

@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::optimize::Deadline;
+
 use super::Candidate;
 use super::noise::{Equation, Mixed, after};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
 use crate::model::Orders;
-use crate::optimize::Deadline;
 
 /// Rounds of least squares with filtered signals.
 pub(super) const ROUNDS: usize = 3;

@@ -7,10 +7,10 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::Cholesky;
+use thetahat_numerics::regression::{Lagged, Presample, Taps};
 
 use super::plant::{Input, add_delayed, divided, energy, multiplied};
 use super::stable;
-use crate::regression::{Lagged, Presample, Taps};
 
 /// What is added to the diagonal of long regressions, as a fraction: then data without noise have a solution too, the
 /// shortest, of which the superfluous poles are inside the unit circle (Kumaresan and Tufts 1982).

@@ -9,11 +9,12 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::optimize::Deadline;
+
 use super::noise::{Equation, Mixed};
 use super::plant::{Best, Equations, Group, Input, Limits, Plant, Point, add_delayed, divided};
 use super::stable;
 use crate::model::{Orders, polynomial::product};
-use crate::optimize::Deadline;
 
 const STEIGLITZ_MCBRIDE: Limits = Limits { iterations: 20, tolerance: 1e-3 };
 const REFINED: Limits = Limits { iterations: 15, tolerance: 1e-3 };

@@ -22,11 +22,13 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::optimize::Deadline;
+use thetahat_numerics::regression::{
+    Lagged, Presample, Taps, add_filtered, divide, divide_together, sum_of_squares,
+};
 
 use super::reduced::{Factor, Free, Reduced};
 use super::stable;
-use crate::optimize::Deadline;
-use crate::regression::{Lagged, Presample, Taps, add_filtered, divide, divide_together, sum_of_squares};
 
 /// Below this fraction of sum y^2, sum e^2 is rounding.
 const EXACT: f64 = 1e-26;

@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
-
-use crate::regression::{Lagged, Presample, Taps, divide_from};
+use thetahat_numerics::regression::{Lagged, Presample, Taps, divide_from};
 
 /// Of a column as a fraction of its square: less than this is rounding, once the columns before it are taken out.
 const ROUNDING: f64 = 1e-14;

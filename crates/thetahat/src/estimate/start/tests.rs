@@ -2,6 +2,11 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Deadline;
+use thetahat_numerics::optimize::Search;
+use thetahat_numerics::regression::{Taps, add_filtered, sum_of_squares};
+
 use super::plant::{Group, Input, Plant, Point, divided};
 use super::reduced::{Free, Reduced};
 use super::{Candidate, candidates, stable};
@@ -12,9 +17,6 @@ use crate::model::{
     Orders,
     polynomial::{is_stable, product},
 };
-use crate::optimize::Deadline;
-use crate::optimize::Search;
-use crate::regression::{Taps, add_filtered, noise::Noise, sum_of_squares};
 
 /// Nearly normal, of unit variance.
 fn normal(noise: &mut Noise, count: usize) -> Vec<f64> {

@@ -1,11 +1,11 @@
 //! What a subspace method asks of data.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::regression::{SAFE_NORMS, joint_gram};
 
 use super::{OrderScore, Subspace};
 use crate::Error;
 use crate::data::JointRecord;
-use crate::regression::{SAFE_NORMS, joint_gram};
 
 /// The data of a subspace method: a record, or [sums](super::SubspaceSums) over parts of one.
 pub(crate) trait SubspaceData {
@@ -51,7 +51,7 @@ impl SubspaceData for JointRecord<'_> {
             let mut means = DVector::zeros(signals.len() * (longest + 1));
             for (place, signal) in signals.iter().enumerate() {
                 let rows = used().flat_map(|segment| &signal[segment.start + longest..segment.end]);
-                let mut total = crate::regression::sum(rows.copied());
+                let mut total = thetahat_numerics::regression::sum(rows.copied());
                 for lag in 0..=longest {
                     means[lag * signals.len() + place] = total / samples as f64;
                     // One sample later the rows begin and end one earlier.

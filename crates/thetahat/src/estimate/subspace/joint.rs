@@ -2,9 +2,10 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::regression::{Column, ExtendedGram, Lagged, Presample, Taps};
+
 use super::super::out_of_range;
 use crate::Error;
-use crate::regression::{Column, ExtendedGram, Lagged, Presample, Taps};
 
 /// All lags of all signals, the outputs first; inputs wait `delays` samples.
 pub(crate) fn joint_taps(delays: &[usize], outputs: usize, longest: usize) -> Vec<Taps> {

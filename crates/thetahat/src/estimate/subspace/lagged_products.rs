@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector};
+use thetahat_numerics::optimize::normal;
 
 use super::data::SubspaceData;
-use crate::optimize::normal;
 
 /// What is left of a variance by rounding in a Gram matrix, as a fraction of it.
 pub(in crate::estimate) const ROUNDING: f64 = 1e-13;
@@ -122,7 +122,7 @@ impl LaggedProducts {
     ) -> Option<Self> {
         let scales: Vec<f64> =
             (0..inputs + outputs).map(|signal| products[(signal, signal)].sqrt()).collect();
-        if !scales.iter().all(|scale| crate::regression::SAFE_NORMS.contains(scale)) {
+        if !scales.iter().all(|scale| thetahat_numerics::regression::SAFE_NORMS.contains(scale)) {
             return None;
         }
         let products = rescaled(products, &scales);

@@ -5,12 +5,12 @@ use std::ops::RangeInclusive;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::regression::{ExtendedGram, Lagged, Presample};
 
 use super::data::SubspaceData;
 use super::joint::{joint_columns, joint_taps};
 use super::{LONGEST_PAST, OrderScore, Subspace, SubspaceOptions, Weighting, longest_past};
 use crate::Error;
-use crate::regression::{ExtendedGram, Lagged, Presample};
 
 /// The samples that a predictor runs over before its errors count.
 const RUN: usize = 10;

@@ -1,8 +1,8 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::random::Random;
 
 use super::*;
 use crate::model::riccati::stationary;
-use crate::random::Random;
 
 /// Two inputs, two outputs, four states of two lightly damped modes.
 pub(in crate::estimate) fn plant() -> StateSpace {

@@ -1,7 +1,8 @@
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::regression::divide;
+
 use super::*;
 use crate::model::polynomial::inverse_series;
-use crate::regression::divide;
-use crate::regression::noise::Noise;
 
 /// sum zeta zeta' from the matrix of psi.
 fn dense(

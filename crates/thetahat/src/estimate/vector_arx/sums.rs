@@ -1,10 +1,11 @@
 //! ARX models with several outputs from sums of products alone: the rows are gone.
 
+use thetahat_numerics::regression::{ExtendedGram, Taps};
+
 use super::super::out_of_range;
 use super::super::subspace::{LaggedProducts, joint_columns};
 use super::{VectorArxEstimate, VectorArxOptions, of_products};
 use crate::Error;
-use crate::regression::{ExtendedGram, Taps};
 
 /// [`vector_arx`](super::vector_arx) of products of signals less their offsets.
 ///

@@ -1,8 +1,9 @@
+use thetahat_numerics::random::Random;
+
 use super::*;
 use crate::data::Record;
 use crate::estimate::{Initial, arx};
 use crate::model::Orders as PolynomialOrders;
-use crate::random::Random;
 
 const A: [[[f64; 2]; 2]; 2] = [[[-0.9, 0.3], [0.2, -0.5]], [[0.4, 0.0], [-0.1, 0.2]]];
 const B: [[[f64; 1]; 2]; 2] = [[[1.0], [0.5]], [[-0.4], [0.8]]];

@@ -3,6 +3,7 @@ use thetahat_core::{
     Augmented, Covariance, ExtendedKalmanFilter, KalmanFilter, LinearObservation, LinearTransition,
     ParametricObservation, ParametricTransition,
 };
+use thetahat_numerics::noise::Noise;
 
 use super::filter;
 use crate::filter::{Estimator, StateEstimate, StateFilter, StateModel};
@@ -10,7 +11,6 @@ use crate::model::{
     GreyBox,
     equations::tests::{CART, PENDULUM},
 };
-use crate::regression::noise::Noise;
 
 /// The cart with a known mass of 2, in equations and in matrices.
 fn known_cart() -> (String, String) {

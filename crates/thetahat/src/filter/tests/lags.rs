@@ -1,12 +1,12 @@
 //! Filters of nonlinear ARX models.
 
 use thetahat_core::nalgebra::{Complex, DVector};
+use thetahat_numerics::random::Random;
 
 use crate::data::{Channel, Log, Rows};
 use crate::filter::kind::{Kind, Motion};
 use crate::filter::{Estimator, InitialState, ObserverGain, StateFilter, StateModel};
 use crate::model::{Activation, Model};
-use crate::random::Random;
 use crate::report::{InputLags, MapPlan, NonlinearArxPlan, Report, apply, fit_nonlinear_arx};
 use crate::respond::{Horizon, InitialCondition};
 

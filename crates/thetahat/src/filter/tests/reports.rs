@@ -1,8 +1,9 @@
+use thetahat_numerics::noise::Noise;
+
 use crate::Error;
 use crate::data::{Channel, Log, Offset, Record};
 use crate::filter::{Estimator, InitialState, StateFilter, StateModel, linear::Linear};
 use crate::model::{Model, Orders, PolynomialModel};
-use crate::regression::noise::Noise;
 use crate::report::{Plan, StateSpacePlan, fit_state_space, identify};
 use crate::respond::{Horizon, InitialCondition, predict};
 

@@ -1,10 +1,11 @@
 //! The quality of one channel, in one pass.
 
+use thetahat_numerics::regression::sum;
+
 use super::counts::Counts;
 use super::far::Distances;
 use crate::inspect::saturation::{NEAR, crowded};
 use crate::inspect::{ChannelQuality, Saturation, channel::NAMED, moments, quantization};
-use crate::regression::sum;
 
 /// Levels at a limit: it, those near it, and one more.
 const LEVELS: usize = NEAR + 2;

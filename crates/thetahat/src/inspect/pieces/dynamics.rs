@@ -1,13 +1,13 @@
 //! Excitation, delay and feedback, in one pass.
 
 use rayon::prelude::*;
+use thetahat_numerics::regression::LaggedMoments;
 
 use super::input::{InputTotals, Twins};
 use super::part::Part;
 use crate::Error;
 use crate::data::{Channel, GAP, Log, Record, Rows};
 use crate::inspect::{DelayEstimate, Feedback, Inspection, InspectionPlan, delay, moments, spectrum};
-use crate::regression::LaggedMoments;
 use crate::select::delays_of;
 use crate::validate::feedback::feedback;
 

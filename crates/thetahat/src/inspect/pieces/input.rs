@@ -2,10 +2,11 @@
 
 use std::slice;
 
+use thetahat_numerics::regression::{ExtendedGram, Lagged, LaggedMoments, Presample, Taps};
+
 use super::part::Part;
 use crate::inspect::spectrum::Periodograms;
 use crate::inspect::{Excitation, excitation, moments, rest};
-use crate::regression::{ExtendedGram, Lagged, LaggedMoments, Presample, Taps};
 
 /// A pair of inputs of which this fraction of the squares differs in any part is not the same.
 const APART: f64 = 1e-9;
@@ -64,7 +65,7 @@ impl InputTotals {
         let mut ahead = None;
         for segment in &segments {
             let own = segment.start.max(part.past)..segment.end;
-            self.total += crate::regression::sum(centred[own.clone()].iter().copied());
+            self.total += thetahat_numerics::regression::sum(centred[own.clone()].iter().copied());
             self.count += own.len() as f64;
             let moves = |row: usize| row > segment.start && values[row] != values[row - 1];
             let moving = own.clone().filter(|&row| moves(row));

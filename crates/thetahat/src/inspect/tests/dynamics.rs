@@ -1,5 +1,7 @@
 //! Excitation, delay and feedback against definitions, and how often they are right.
 
+use thetahat_numerics::regression::Lagged;
+
 use super::*;
 
 #[test]
@@ -14,7 +16,6 @@ fn noise_and_no_drift_is_rest() {
     let moving = [vec![0.0; 50], normal(9, 150)].concat();
     assert_eq!(rest::rest(&[&moving], &noisy, &whole(&moving)), None);
 }
-use crate::regression::Lagged;
 
 fn order(values: &[f64]) -> usize {
     excitation::excitation("u", values, &whole(values), 1.0).order

@@ -1,9 +1,10 @@
 //! What follows from polynomials, against finite differences and against the spread of sampled models.
 
+use thetahat_numerics::distribution::two_sided;
+use thetahat_numerics::noise::Noise;
+
 use super::*;
-use crate::distribution::two_sided;
 use crate::model::{Orders, polynomial::product};
-use crate::regression::noise::Noise;
 
 /// A square root of a covariance matrix, and the matrix.
 struct Spread {

@@ -1,7 +1,8 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::{Offset, Record};
 use crate::estimate::{Initial, arx};
-use crate::regression::noise::Noise;
 
 /// The model fitted to data that ARX with these parameters made without noise.
 fn fitted(a: &[f64], b: &[f64]) -> PolynomialModel {

@@ -5,10 +5,10 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::{
     Activation as CoreActivation, MOST_NEIGHBOURS, MOST_SLOPES, Membership as CoreMembership,
 };
+use thetahat_numerics::regression::Monomials;
 
 use super::terms::{factors, written};
 use crate::Error;
-use crate::regression::Monomials;
 
 use crate::figures::short;
 

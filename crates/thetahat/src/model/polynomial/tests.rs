@@ -1,5 +1,6 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
-use crate::regression::noise::Noise;
 
 #[test]
 fn known_roots_come_back() {

@@ -1,12 +1,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, DMatrix};
+use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
 use super::eigen::{eigenvalues, solved};
 use super::uncertainty::spread;
 use super::{Entry, EntryCovariance, StateSpace, StateSpaceMatrix};
 use crate::Error;
-use crate::distribution::{student_factor, student_two_sided};
 use crate::model::dynamics::{LEVEL, time_constant};
 use crate::model::{Quantity, Root, Signal};
 

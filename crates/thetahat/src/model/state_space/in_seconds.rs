@@ -1,6 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{Complex, DMatrix};
+use thetahat_numerics::distribution::student_two_sided;
 
 use super::eigen::solved;
 use super::spot_noise::{Steps, WHOLE};
@@ -9,7 +10,6 @@ use super::{
     ContinuousStateSpace, EntryCovariance, Hold, StateSpace, StateSpaceMatrix, StateSpaceModel,
     ZerosPolesGain,
 };
-use crate::distribution::student_two_sided;
 use crate::model::dynamics::LEVEL;
 use crate::model::{Interval, Quantity, Root, Signal};
 use crate::{Error, figures};

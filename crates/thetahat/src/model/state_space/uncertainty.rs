@@ -433,7 +433,7 @@ mod tests {
     use crate::Error;
     use crate::data::Offset;
     use crate::model::Signal;
-    use crate::random::Random;
+    use thetahat_numerics::random::Random;
 
     fn plant() -> StateSpace {
         StateSpace {

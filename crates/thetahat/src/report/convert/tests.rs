@@ -1,6 +1,7 @@
+use thetahat_numerics::noise::Noise;
+
 use crate::data::{Channel, Log, Rows};
 use crate::model::{Hold, Model, Orders, TimeBase};
-use crate::regression::noise::Noise;
 use crate::report::{Plan, Report, StateSpacePlan, ValidationPlan, fit_state_space, identify, validate};
 use crate::respond::{Horizon, InitialCondition};
 use crate::{Document, Error};

@@ -1,9 +1,10 @@
 //! What a careful reader of a fit of a model in equations should know, in plain words.
 
+use thetahat_numerics::optimize::Stopped;
+
 use crate::estimate::{Procedure, equations::listed};
 use crate::figures::{chance, fixed};
 use crate::model::{EquationsModel, GreyBox};
-use crate::optimize::Stopped;
 use crate::report::schema::Estimation;
 use crate::respond::{
     OnLog, Tested,

@@ -1,10 +1,11 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::random::Random;
+
 use super::*;
 use crate::data::Channel;
 use crate::estimate::{Constant, Initial};
 use crate::model::Orders;
-use crate::random::Random;
 use crate::report::identify;
 
 /// x(t) = 1.5 x(t-1) - 0.7 x(t-2) + u(t-1) + 0.5 u(t-2) from a state of its own, seen 3 higher with noise: e, or e + 0.6 e(t-1).

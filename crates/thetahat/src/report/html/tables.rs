@@ -4,6 +4,7 @@ mod inspection;
 mod validation;
 
 pub(super) use inspection::{channels, clock, delays, excitation};
+use thetahat_numerics::optimize::Stopped;
 use validation::asked;
 pub(super) use validation::{anderson, coverage, noise, tests, which};
 
@@ -18,7 +19,6 @@ use crate::model::{
     ContinuousStateSpaceModel, EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel,
     ProcessModel, Quantity, Root, Signal, StateSpaceModel,
 };
-use crate::optimize::Stopped;
 use crate::report::{Estimation, InSample, Report, Validated};
 use crate::respond::InitialCondition;
 use crate::select::{Candidate, Selection};

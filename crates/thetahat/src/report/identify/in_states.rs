@@ -1,9 +1,10 @@
 //! The model in state space that a default choice may come to.
 
+use thetahat_numerics::optimize::Monitor;
+
 use crate::Error;
 use crate::data::{Log, Source};
 use crate::estimate::{Initial, Method};
-use crate::optimize::Monitor;
 use crate::report::{Plan, Report, StateSpacePlan, fit_state_space_monitored};
 use crate::select::{Automatic, Choice, Focus, Select, Selection};
 

@@ -1,11 +1,12 @@
 //! Constants and trends: what they change, and what they leave.
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Search;
+
 use super::*;
 use crate::data::{Channel, Record};
 use crate::estimate::{ConvexFit, estimate};
 use crate::model::{Model, PolynomialModel};
-use crate::optimize::Search;
-use crate::regression::noise::Noise;
 use crate::report::Report;
 use crate::select::{Automatic, Grid, OrderRange, Path};
 

@@ -1,10 +1,11 @@
 //! The process that a step test may be described by.
 
+use thetahat_numerics::optimize::Monitor;
+
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, Source};
 use crate::estimate::{Background, Constant, Initial, Method};
 use crate::model::ProcessStructure;
-use crate::optimize::Monitor;
 use crate::report::{Plan, ProcessPlan, Report, fit_process};
 use crate::respond::process::{HeldLog, held_logs};
 use crate::select::{Automatic, Choice, Focus, SelectedModel, Selection, Task, is_step_test, processes};

@@ -1,6 +1,7 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::Channel;
-use crate::regression::noise::Noise;
 use crate::report::{StateSpacePlan, fit_state_space};
 use crate::select::{Automatic, Select};
 use crate::select::{Grid, OrderRange, Path};

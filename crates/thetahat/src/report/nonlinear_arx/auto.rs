@@ -1,13 +1,14 @@
 //! The choice among all maps, and the linear model that takes part in it.
 
+use thetahat_numerics::optimize::Monitor;
+use thetahat_numerics::regression::Monomials;
+
 use super::fit_planned;
 use super::plan::{InputLags, MapPlan, NonlinearArxPlan};
 use crate::Error;
 use crate::data::{Log, Rows, Source};
 use crate::estimate::{MapsOutcome, Procedure, RunFigures, TermStep};
 use crate::model::{Activation, Model};
-use crate::optimize::Monitor;
-use crate::regression::Monomials;
 use crate::report::shares::Shares;
 use crate::report::{Plan, Report, apply, identify_monitored};
 use crate::respond::nonlinear_arx::within;

@@ -1,5 +1,8 @@
 //! The map of an output: its functions, and what their parameters are.
 
+use thetahat_numerics::optimize::Monitor;
+use thetahat_numerics::regression::Monomials;
+
 use super::super::shares::Shares;
 use super::plan::{Centres, MapPlan, NonlinearArxPlan};
 use crate::Error;
@@ -9,8 +12,6 @@ use crate::estimate::{
     nonlinear_arx::{Candidates, Chosen, Count, Growth, Samples, Solved, Training, Units, centres, splines},
 };
 use crate::model::{Map, NonlinearArxModel};
-use crate::optimize::Monitor;
-use crate::regression::Monomials;
 use crate::respond::Horizon;
 use crate::select::Select;
 

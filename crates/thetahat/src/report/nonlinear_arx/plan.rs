@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::Search;
 
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
 use crate::estimate::nonlinear_arx::Units;
 use crate::model::{Activation, ChannelExpression, Membership};
-use crate::optimize::Search;
 use crate::respond::Horizon;
 use crate::select::Select;
 

@@ -3,11 +3,12 @@ mod boxes_and_neighbours;
 mod networks;
 mod outputs_and_expressions;
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::{Channel, Detrend};
 use crate::estimate::Constant;
 use crate::model::Orders;
-use crate::regression::noise::Noise;
 use crate::report::{Plan, ValidationPlan, identify, validate};
 use crate::respond::InitialCondition;
 use crate::select::Select;

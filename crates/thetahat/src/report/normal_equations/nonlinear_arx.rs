@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use thetahat_numerics::regression::{DividedMonomials, ExtendedGram, Monomials};
 
 use super::super::nonlinear_arx::{
     MapPlan, NonlinearArxPlan, ROUNDING, Reported, head, is_constant, reported, warnings, with_expressions,
@@ -15,7 +16,6 @@ use crate::data::Offset;
 use crate::estimate::nonlinear_arx::{Candidates, Count, Joint, of_sums};
 use crate::estimate::{MapsOutcome, Procedure, out_of_range};
 use crate::model::{ChannelExpression, Map, NonlinearArxModel, Signal};
-use crate::regression::{DividedMonomials, ExtendedGram, Monomials};
 use crate::respond::InitialCondition;
 use crate::select::Select;
 

@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use thetahat_numerics::regression::ExtendedGram;
+
 use super::super::schema::Report;
 use super::super::state_space::{Estimated, by_sums, is_constant, of_arx, reported};
 use super::NormalEquations;
@@ -11,7 +13,6 @@ use crate::estimate::{
     SubspaceOptions, SubspaceSums, VectorArxOptions, joint_taps, out_of_range, vector_arx_of_sums,
 };
 use crate::model::Signal;
-use crate::regression::ExtendedGram;
 use crate::respond::InitialCondition;
 
 /// With the offsets of all pieces, the orders and the coupling of the least MDL among those that were asked for, and levels likewise.

@@ -1,10 +1,11 @@
 //! Fits of processes to measured frequency responses.
 
+use thetahat_numerics::optimize::Monitor;
+
 use super::{ProcessPlan, model};
 use crate::data::Offset;
 use crate::estimate::{Criteria, Procedure, ResponsePoints, least_response_errors};
 use crate::model::{Model, ProcessModel, Signal};
-use crate::optimize::Monitor;
 use crate::report::Report;
 use crate::report::schema::{Data, Estimation, Missing};
 use crate::respond::FrequencyResponse;

@@ -1,8 +1,9 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::Channel;
-use crate::regression::noise::Noise;
 use crate::respond::process::run;
 use crate::respond::{Horizon, InitialCondition};
 

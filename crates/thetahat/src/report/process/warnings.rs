@@ -1,9 +1,10 @@
 //! What a careful reader of a process should know.
 
+use thetahat_numerics::optimize::Stopped;
+
 use crate::estimate::Procedure;
 use crate::figures::{number, short};
 use crate::model::{Parameter, ProcessModel, polynomial};
-use crate::optimize::Stopped;
 use crate::report::Estimation;
 use crate::respond::process::HeldLog;
 

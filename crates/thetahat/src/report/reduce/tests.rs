@@ -1,6 +1,7 @@
+use thetahat_numerics::noise::Noise;
+
 use crate::data::{Channel, Log};
 use crate::model::Orders;
-use crate::regression::noise::Noise;
 use crate::report::{Plan, Report, ValidationPlan, identify, validate};
 use crate::{Document, Error};
 

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::Monitor;
 
 use super::StateSpacePlan;
 use crate::Error;
@@ -13,7 +14,6 @@ use crate::estimate::{
     products_of_innovations, refined, subspace, vector_arx, with_levels,
 };
 use crate::model::{EntryCovariance, StateSpace};
-use crate::optimize::Monitor;
 
 /// Singular values that a report keeps.
 const MOST_VALUES: usize = 40;

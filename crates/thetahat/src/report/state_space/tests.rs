@@ -1,7 +1,8 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::Channel;
 use crate::estimate::Procedure;
-use crate::regression::noise::Noise;
 use crate::report::{Requirement, ValidationPlan, validate};
 use crate::respond::Horizon;
 

@@ -2,10 +2,11 @@
 
 use std::ops::RangeInclusive;
 
+use thetahat_numerics::optimize::Stopped;
+
 use crate::estimate::{Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome, VectorArxScore};
 use crate::figures::fixed;
 use crate::model::StateSpaceModel;
-use crate::optimize::Stopped;
 use crate::report::Estimation;
 
 /// Fewer values of the outputs for each free parameter say little.

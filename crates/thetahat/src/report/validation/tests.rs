@@ -1,11 +1,12 @@
 //! What a validation says of models whose truth is known.
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Search;
+
 use super::*;
 use crate::data::Channel;
 use crate::estimate::{Initial, Method};
 use crate::model::Orders;
-use crate::optimize::Search;
-use crate::regression::noise::Noise;
 use crate::report::{Demand, Plan, Requirement, identify};
 use crate::respond::InitialCondition;
 

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use thetahat_core::Dual;
+use thetahat_numerics::distribution::two_sided;
 
 use super::experiment::{Experiment, experiments};
 use super::free_run::{FreeRun, InitialState, free_run};
@@ -12,7 +13,6 @@ use super::predictor::Predictor;
 use super::walk::{Failure, Predicted, ahead, beyond, walk};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
-use crate::distribution::two_sided;
 use crate::model::{EquationsModel, GreyBox, Orders, PolynomialModel, Signal};
 use crate::respond::{
     Forecast, Horizon, InitialCondition, Innovations, Response, check_steps,

@@ -4,11 +4,12 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::OnceLock;
 
+use thetahat_numerics::regression::Span;
+
 use super::held::{HeldLog, at_rest, held_logs, modes, sensitivities};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
 use crate::model::{Orders, Parts, PolynomialModel, ProcessModel, Signal};
-use crate::regression::Span;
 use crate::respond::{
     Forecast, Horizon, InitialCondition, Innovations, Response,
     on_log::{OnLog, Tested},

@@ -21,9 +21,9 @@
 //! rather than to rounding. Outputs of which nothing but rounding is left beside others, as where R is singular, have no gain of their own.
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::optimize::normal;
 
 use crate::model::StateSpace;
-use crate::optimize::normal;
 
 /// A state is known where what is not known of it adds less than this to the outputs of the next n rows, in units of their noise variances,
 /// summed over outputs and rows: innovations then differ by less than their twelfth digit.

@@ -1,10 +1,10 @@
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::optimize::normal;
 
 use super::covariance::StateCovariance;
 use crate::model::StateSpace;
-use crate::optimize::normal;
 
 /// Rows that are added up together.
 const BLOCK: usize = 4;

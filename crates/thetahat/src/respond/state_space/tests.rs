@@ -1,11 +1,11 @@
 mod missing_outputs;
 
 use thetahat_core::nalgebra::DMatrix;
+use thetahat_numerics::noise::Noise;
 
 use super::*;
 use crate::data::{Channel, Log, Offset};
 use crate::model::{LinearModel, Model, Orders, PolynomialModel, Signal, StateSpace, StateSpaceModel};
-use crate::regression::noise::Noise;
 use crate::respond::{
     Horizon, InitialCondition, OnLog, PolynomialOnLog, frequency_response, impulse_response, step_response,
 };

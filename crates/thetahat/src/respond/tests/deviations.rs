@@ -1,10 +1,11 @@
 //! The deviations of predictions against finite differences, and against what is known in closed form.
 
+use thetahat_numerics::noise::Noise;
+
 use super::general::{model, models, output};
 use super::{signals, views, with_poles};
 use crate::data::Record;
 use crate::model::{OffsetCovariance, Orders, PolynomialModel};
-use crate::regression::noise::Noise;
 use crate::respond::{
     Draws, InitialCondition, draw, forecast, predict, prediction_deviation, prediction_deviations,
 };

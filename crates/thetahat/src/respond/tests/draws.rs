@@ -1,9 +1,10 @@
 //! Draws against what they are drawn from.
 
+use thetahat_numerics::noise::Noise;
+
 use crate::Error;
 use crate::data::{Channel, Log, Record, Rows};
 use crate::model::{Orders, PolynomialModel};
-use crate::regression::noise::Noise;
 use crate::respond::{Draws, InitialCondition, draw, simulate};
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {

@@ -1,10 +1,11 @@
 //! Forecasts against the recursions, and against the mean of many futures.
 
+use thetahat_numerics::noise::Noise;
+
 use super::general::{Recursion, model, models, output};
 use super::{signals, views, with_poles};
 use crate::Error;
 use crate::data::Record;
-use crate::regression::noise::Noise;
 use crate::respond::{InitialCondition, forecast, predict, prediction_deviation};
 
 #[test]

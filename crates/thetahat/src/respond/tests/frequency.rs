@@ -2,10 +2,11 @@
 
 use std::f64::consts::PI;
 
+use thetahat_numerics::noise::Noise;
+
 use super::general::models;
 use crate::Error;
 use crate::model::PolynomialModel;
-use crate::regression::noise::Noise;
 use crate::respond::{FrequencyPoint, frequency_response, logarithmic_frequencies};
 
 /// A covariance matrix of some parameters, well conditioned and not diagonal.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use thetahat_numerics::noise::Noise;
+
 use super::{cut, difference, signals, views, with_poles};
 use crate::Error;
 use crate::data::Record;
@@ -10,7 +12,6 @@ use crate::model::{
     Orders, PolynomialModel, Signal,
     polynomial::{inverse_series, product},
 };
-use crate::regression::noise::Noise;
 use crate::respond::{
     InitialCondition, innovations::innovations, predict, predict::deviations, prediction_deviation, simulate,
 };

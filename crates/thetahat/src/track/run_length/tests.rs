@@ -2,9 +2,9 @@ use thetahat_core::nalgebra::{Matrix2, Matrix3x2, SVector, Vector2, Vector3};
 use thetahat_core::{
     Action, Chart, Covariance, Innovation, KalmanFilter, LinearObservation, LinearTransition,
 };
+use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::regression::noise::Noise;
 
 /// Gaussian numbers (Box and Muller 1958).
 fn gaussian(noise: &mut Noise) -> f64 {

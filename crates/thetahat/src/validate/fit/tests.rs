@@ -1,8 +1,9 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
 use crate::data::{Offset, Record};
 use crate::estimate::{Initial, arx};
 use crate::model::{Orders, PolynomialModel, Signal};
-use crate::regression::noise::Noise;
 use crate::respond::{predict, simulate};
 
 #[test]

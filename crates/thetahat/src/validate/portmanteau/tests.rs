@@ -1,5 +1,6 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
-use crate::regression::noise::Noise;
 
 fn innovations(errors: Vec<f64>) -> Vec<Innovations> {
     let rows = 0..errors.len();

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
+use thetahat_numerics::optimize::Objective;
+use thetahat_numerics::regression::product;
 
 use super::super::Samples;
 use crate::model::{Evaluator, Map};
-use crate::optimize::Objective;
-use crate::regression::product;
 use crate::respond::Horizon;
 
 /// Samples whose slopes are summed at once.

@@ -1,8 +1,9 @@
 //! Where trainings start from.
 
+use thetahat_numerics::random::Random;
+
 use super::super::Samples;
 use crate::model::{Activation, Map};
-use crate::random::Random;
 
 /// Functions of which the numbers are trained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,10 +4,11 @@ use super::objective::{Lost, RunErrors};
 use super::*;
 use crate::data::{Channel, Detrend, Log};
 use crate::model::{Model, NonlinearArxModel};
-use crate::optimize::Objective;
-use crate::random::Random;
 use crate::report::{InputLags, NonlinearArxPlan, fit_nonlinear_arx};
 use std::ops::ControlFlow;
+
+use thetahat_numerics::optimize::Objective;
+use thetahat_numerics::random::Random;
 
 /// A tank-like log: the output is held back the more the higher it is.
 fn log(rows: usize) -> Log {

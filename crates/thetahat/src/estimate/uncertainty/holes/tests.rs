@@ -1,5 +1,6 @@
+use thetahat_numerics::noise::Noise;
+
 use super::*;
-use crate::regression::noise::Noise;
 
 #[test]
 fn what_is_missing_is_expected_as_the_dense_matrices_say() {

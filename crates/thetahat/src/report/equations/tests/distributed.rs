@@ -1,10 +1,11 @@
 use std::ops::ControlFlow;
 
+use thetahat_numerics::random::Random;
+
 use crate::Error;
 use crate::data::{Channel, Log, Rows};
 use crate::estimate::{Answer, Ask, Question};
 use crate::model::GreyBox;
-use crate::random::Random;
 use crate::report::{EquationsPlan, Report, answer_equations, fit_equations, fit_equations_distributed};
 
 fn tank() -> GreyBox {

@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use thetahat_numerics::optimize::Stopped;
+
 use super::models::{Found, experiment, joined};
 use crate::data::{Channel, Recording, Source, Times};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::{GreyBox, Model};
-use crate::optimize::Stopped;
 use crate::report::{EquationsPlan, Report, ValidationPlan, fit_equations, validate};
 use crate::respond::{Horizon, NisSummary};
 use crate::{Document, Error};

@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 
+use thetahat_numerics::noise::Noise;
+
 use crate::Error;
 use crate::data::{Channel, Log, Recording, Rows, Times};
 use crate::estimate::{EquationsOutcome, Procedure};
 use crate::model::{EquationsModel, GreyBox, Model};
-use crate::regression::noise::Noise;
 use crate::report::{EquationsPlan, Report, fit_equations};
 use crate::respond::{
     Horizon,

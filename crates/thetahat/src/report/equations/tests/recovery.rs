@@ -1,9 +1,10 @@
 //! What the fit finds in simulated logs. How often its intervals cover the truth is in tests/monte_carlo.
 
+use thetahat_numerics::optimize::Stopped;
+
 use super::models::{Found, TRUTH, fitted, log, pendulum, pendulum_text};
 use crate::data::Recording;
 use crate::model::GreyBox;
-use crate::optimize::Stopped;
 use crate::respond::Horizon;
 
 fn found(model: &GreyBox, log: Recording) -> Found {

@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use thetahat_numerics::noise::Noise;
+use thetahat_numerics::optimize::Stopped;
+
 use super::models::{Found, joined};
 use crate::Error;
 use crate::data::{Channel, Recording, Times};
 use crate::model::GreyBox;
-use crate::optimize::Stopped;
-use crate::regression::noise::Noise;
 use crate::report::{EquationsPlan, fit_equations};
 
 /// dx/dt = (gain scale u - loss x + push)/1, y = x, with the lines of some parameters.

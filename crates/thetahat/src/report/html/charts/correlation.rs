@@ -1,10 +1,11 @@
 //! Correlations with their bands.
 
+use thetahat_numerics::distribution::two_sided;
+
 use super::super::decimate::{Curve, rounded};
 use super::super::figure::{COLOURS, Drawn, NEUTRAL, axis, band, chart, layout, line, significant};
 use super::super::object::{self, Object};
 use super::super::text;
-use crate::distribution::two_sided;
 use crate::figures;
 use crate::inspect::DelayEstimate;
 use crate::validate::{Independence, Residuals};

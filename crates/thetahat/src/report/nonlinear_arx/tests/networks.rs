@@ -1,8 +1,9 @@
 //! Trained maps: networks, free radial basis functions, and the choice among all.
 
+use thetahat_numerics::random::Random;
+
 use super::*;
 use crate::model::Activation;
-use crate::random::Random;
 use crate::respond::nonlinear_arx::NonlinearArxOnLog;
 use crate::respond::{InitialCondition, OnLog};
 

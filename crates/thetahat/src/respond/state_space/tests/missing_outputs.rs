@@ -1,12 +1,12 @@
 //! Predictions through rows in which outputs are missing.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_numerics::noise::Noise;
 
 use super::signal;
 use crate::Error;
 use crate::data::{Channel, Log, Rows};
 use crate::model::{StateSpace, StateSpaceModel};
-use crate::regression::noise::Noise;
 use crate::respond::state_space::covariance::{StateCovariance, added};
 use crate::respond::{Horizon, InitialCondition, OnLog, state_space::StateSpaceOnLog};
 

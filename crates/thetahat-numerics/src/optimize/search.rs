@@ -1,0 +1,287 @@
+//! The search itself.
+
+use super::annealing::anneal;
+use super::objective::Objective;
+use super::options::{Algorithm, Search};
+use super::outcome::{Deadline, Found, Monitor, Progress, Stopped};
+use super::solved::{best_free, solve_linear};
+use super::workspace::{LARGEST_DAMPING, SMALLEST_DAMPING, Workspace};
+use crate::Error;
+
+/// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
+const FIRST_DAMPING: f64 = 1e-8;
+/// The last step is taken if it predicts more than this fraction of the tolerance.
+const WORTH_TAKING: f64 = 0.01;
+/// After so many halvings no step is long enough to matter.
+const HALVINGS: usize = 40;
+/// So often trials may be drawn in from outside in vain, in a search.
+const DRAWN_IN: usize = 3;
+const MOST_ITERATIONS: usize = 10_000;
+/// A predicted decrease of this fraction of the cost is lost in rounding.
+const ROUNDING: f64 = 1e-10;
+/// Where the cost falls by so many times what was predicted, a longer step is tried.
+const BETTER: f64 = 1.2;
+
+/// How the steps of an iteration are made from its normal equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rule {
+    Damped,
+    Halved,
+}
+
+/// A step that lowers the cost.
+struct Accepted {
+    /// The cost after it.
+    cost: f64,
+    /// The decrease that was predicted; infinite for a trial that was drawn in from outside.
+    predicted: f64,
+}
+
+/// Searches from `start` for the parameters of the least cost.
+///
+/// The objective is left at the parameters found. `smallest` is a cost that is nothing.
+///
+/// # Errors
+/// [`Error::Interrupted`]; the refusal of a start that has no cost, or of a point that has no normal equations.
+pub fn search<O: Objective>(
+    objective: &mut O,
+    start: &[f64],
+    options: &Search,
+    smallest: f64,
+    deadline: Deadline,
+    monitor: Monitor<'_>,
+) -> Result<Result<Found, O::Refusal>, Error> {
+    let mut start = start.to_vec();
+    let mut cost = best_free(objective, &start);
+    if let (Ok(own), Algorithm::Annealing) = (&cost, options.algorithm) {
+        cost = anneal(objective, &mut start, *own, options, deadline, monitor)?;
+    }
+    let cost = match cost {
+        Ok(cost) => cost,
+        Err(refusal) => return Ok(Err(refusal)),
+    };
+    let mut descent = Descent {
+        objective,
+        workspace: Workspace::new(start.len(), options.algorithm == Algorithm::Newton),
+        parameters: start,
+        cost,
+        damping: FIRST_DAMPING,
+        unstable_steps: 0,
+        stability_bound: false,
+        drawn_in: 0,
+    };
+    // Memory for all of them, unless these are more than anybody waits for.
+    let mut costs = Vec::with_capacity(options.max_iterations.min(MOST_ITERATIONS) + 1);
+    costs.push(cost);
+    let mut gradient_norm;
+    let stopped = loop {
+        let iteration = costs.len() - 1;
+        if monitor(Progress { iteration, cost: descent.objective.mean(descent.cost) }).is_break() {
+            return Err(Error::Interrupted);
+        }
+        // The free responses alone can lower the cost by so much.
+        let free_gain = match descent.objective.linearize() {
+            Ok(gain) => gain,
+            Err(refusal) => return Ok(Err(refusal)),
+        };
+        let predicted = descent.workspace.scale(descent.objective) + free_gain;
+        let scale = descent.objective.scale(descent.cost);
+        gradient_norm =
+            (descent.workspace.right.iter().map(|value| value * value).sum::<f64>() / scale).sqrt();
+        if descent.cost <= smallest || predicted <= options.tolerance * scale {
+            if descent.cost <= smallest {
+                gradient_norm = 0.0;
+            } else if predicted > WORTH_TAKING * options.tolerance * scale {
+                costs.extend(descent.last_step());
+            }
+            break Stopped::Converged;
+        }
+        if iteration >= options.max_iterations {
+            break Stopped::MaxIterations;
+        }
+        if deadline.is_over() {
+            break Stopped::TimeLimit;
+        }
+        let rule = descent.direction(options, iteration);
+        let Some(accepted) = descent.step(rule, free_gain) else {
+            let rounding = predicted <= descent.rounding();
+            break if rounding && !descent.stability_bound { Stopped::Converged } else { Stopped::NoDescent };
+        };
+        let fall = descent.cost - accepted.cost;
+        descent.parameters.copy_from_slice(&descent.workspace.trial);
+        descent.cost = accepted.cost;
+        costs.push(accepted.cost);
+        let scale = descent.objective.scale(descent.cost);
+        if accepted.predicted == f64::INFINITY && fall <= options.tolerance * scale {
+            break Stopped::NoDescent;
+        }
+        // What is left to gain is lost in rounding, and so is what a step gains.
+        if predicted <= descent.rounding() && fall < 0.1 * accepted.predicted {
+            break Stopped::Converged;
+        }
+    };
+    let Descent { parameters, stability_bound, unstable_steps, .. } = descent;
+    Ok(Ok(Found { parameters, costs, gradient_norm, stopped, stability_bound, unstable_steps }))
+}
+
+/// A search on its way.
+struct Descent<'o, O> {
+    objective: &'o mut O,
+    workspace: Workspace,
+    /// Where it stands, and the cost there.
+    parameters: Vec<f64>,
+    cost: f64,
+    damping: f64,
+    /// Trials that were refused as they are outside, whether there was one in the last iteration, and how many were drawn in in
+    /// vain.
+    unstable_steps: usize,
+    stability_bound: bool,
+    drawn_in: usize,
+}
+
+impl<O: Objective> Descent<'_, O> {
+    /// A decrease of the cost that is lost in rounding.
+    fn rounding(&self) -> f64 {
+        ROUNDING * self.objective.scale(self.cost).max(self.cost.abs())
+    }
+
+    /// Takes the full step that is there already, if it lowers the cost, and gives the cost then: where convergence is slow, it is
+    /// a good part of the way that is left.
+    fn last_step(&mut self) -> Option<f64> {
+        self.workspace.apply(&self.parameters, 1.0);
+        self.objective.try_free(&self.workspace.moved);
+        match self.objective.evaluate(&self.workspace.trial) {
+            Ok(value) if value < self.cost => {
+                self.parameters.copy_from_slice(&self.workspace.trial);
+                self.cost = value;
+                Some(value)
+            }
+            _ => {
+                self.return_to_point();
+                None
+            }
+        }
+    }
+
+    /// Leaves the direction of an iteration in the workspace, and says how its length is found.
+    fn direction(&mut self, options: &Search, iteration: usize) -> Rule {
+        match options.algorithm {
+            Algorithm::LevenbergMarquardt | Algorithm::Annealing => return Rule::Damped,
+            // The step is there already.
+            Algorithm::GaussNewton => {}
+            Algorithm::Newton => self.workspace.newton_step(self.objective, &self.parameters, self.cost),
+            Algorithm::Gradient => {
+                let length = options.step.at(iteration);
+                let Workspace { step, right, .. } = &mut self.workspace;
+                step.iter_mut().zip(right).for_each(|(step, right)| *step = length * *right);
+            }
+        }
+        Rule::Halved
+    }
+
+    /// Looks for a step that lowers the cost, and leaves where it leads in the trial of the workspace. None if no step does; then
+    /// the objective is back where the search stands.
+    fn step(&mut self, rule: Rule, free_gain: f64) -> Option<Accepted> {
+        self.stability_bound = false;
+        let accepted = self.shortened(rule, free_gain);
+        let Some(mut accepted) = accepted else {
+            self.return_to_point();
+            return None;
+        };
+        let fall = self.cost - accepted.cost;
+        if fall > 0.75 * accepted.predicted {
+            self.damping = (self.damping / 10.0).max(SMALLEST_DAMPING);
+        } else if fall > 0.25 * accepted.predicted {
+            self.damping = (self.damping / 3.0).max(SMALLEST_DAMPING);
+        }
+        if O::STEP_RULES.lengthens && fall > BETTER * accepted.predicted {
+            accepted.cost = self.lengthened(accepted.cost);
+        }
+        Some(accepted)
+    }
+
+    /// A step that is damped or shortened until the cost falls.
+    fn shortened(&mut self, rule: Rule, free_gain: f64) -> Option<Accepted> {
+        let shortenings = O::STEP_RULES.shortenings;
+        let mut fraction = 1.0;
+        let mut tries = 0;
+        loop {
+            if rule == Rule::Damped && (tries == 0 || tries > shortenings) {
+                self.workspace.solve_damped(self.damping);
+            }
+            let predicted = self.workspace.apply(&self.parameters, fraction) + free_gain;
+            self.objective.try_free(&self.workspace.moved);
+            match self.objective.evaluate(&self.workspace.trial) {
+                Ok(cost) if cost < self.cost => return Some(Accepted { cost, predicted }),
+                Err(refusal) if O::is_outside(&refusal) => {
+                    self.stability_bound = true;
+                    self.unstable_steps += 1;
+                    if tries == 0
+                        && self.drawn_in < DRAWN_IN
+                        && self.objective.draw_in(&self.parameters, &mut self.workspace.trial)
+                    {
+                        if let Some(cost) = self.on_border() {
+                            return Some(Accepted { cost, predicted: f64::INFINITY });
+                        }
+                        self.drawn_in += 1;
+                    }
+                }
+                Ok(_) | Err(_) => {}
+            }
+            tries += 1;
+            if rule == Rule::Damped && tries > shortenings {
+                fraction = 1.0;
+                self.damping = (self.damping * 10.0).max(FIRST_DAMPING);
+            } else {
+                fraction /= 2.0;
+            }
+            let exhausted = match rule {
+                Rule::Damped => self.damping > LARGEST_DAMPING,
+                Rule::Halved => tries >= HALVINGS,
+            };
+            if exhausted {
+                return None;
+            }
+        }
+    }
+
+    /// The cost of a trial that was drawn in, with the parameters solved for that errors are linear in. None if it is not below
+    /// that of the point where the search stands; then the objective is there again.
+    fn on_border(&mut self) -> Option<f64> {
+        let Workspace { trial, factor, moved, .. } = &mut self.workspace;
+        if let Ok(cost) = solve_linear(self.objective, trial, factor, moved)
+            && cost < self.cost
+        {
+            return Some(cost);
+        }
+        self.cost = best_free(self.objective, &self.parameters).unwrap_or(self.cost);
+        // It had normal equations before.
+        let _ = self.objective.linearize();
+        None
+    }
+
+    /// Doubles the step to the trial, of this cost, as long as the cost falls. Gives the cost that is reached.
+    fn lengthened(&mut self, mut cost: f64) -> f64 {
+        let Workspace { trial, moved, .. } = &mut self.workspace;
+        loop {
+            // The trial and the longer one change places.
+            for ((longer, trial), start) in moved.iter_mut().zip(&mut *trial).zip(&self.parameters) {
+                (*longer, *trial) = (*trial, start + 2.0 * (*trial - start));
+            }
+            match self.objective.evaluate(trial) {
+                Ok(further) if further < cost => cost = further,
+                _ => break,
+            }
+        }
+        trial.copy_from_slice(moved);
+        // It has been evaluated before.
+        let _ = self.objective.evaluate(trial);
+        cost
+    }
+
+    fn return_to_point(&mut self) {
+        self.objective.keep_free();
+        // It has been evaluated before.
+        let _ = self.objective.evaluate(&self.parameters);
+    }
+}

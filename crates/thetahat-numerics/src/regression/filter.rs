@@ -1,0 +1,75 @@
+//! Filters in q^-1 over segments of a signal: products with a polynomial, and divisions by a monic one.
+
+use std::ops::Range;
+
+use super::kernel;
+
+/// Adds `sum_l weights[l] x(t - l)` to `target`, which stands for the samples `rows`; before sample `start` x is zero.
+pub fn add_filtered(target: &mut [f64], rows: &Range<usize>, weights: &[f64], x: &[f64], start: usize) {
+    let lag = weights.len().saturating_sub(1);
+    let full = (start + lag).clamp(rows.start, rows.end);
+    let (head, tail) = target.split_at_mut(full - rows.start);
+    for (row, value) in (rows.start..full).zip(head) {
+        let known = (row + 1).saturating_sub(start).min(weights.len());
+        // The largest lag comes first, as after the start: the bits are those of a recursion that begins with zeros.
+        let past = weights[..known].iter().rev().zip(&x[row + 1 - known..=row]);
+        past.for_each(|(weight, x)| *value += weight * x);
+    }
+    if full < rows.end && !weights.is_empty() {
+        kernel::add_filtered(tail, weights, &x[full - lag..rows.end]);
+    }
+}
+
+/// x = w/A from rest, in place: `x(t) = w(t) - a1 x(t-1) - … - an x(t-n)`, `monic` being 1, a1 … an. 2 n flops a sample.
+pub fn divide(monic: &[f64], values: &mut [f64]) {
+    divide_together(monic, [values]);
+}
+
+/// The same for several signals of one length. A sample waits for the one before it; side by side, signals wait together.
+pub fn divide_together<const K: usize>(monic: &[f64], signals: [&mut [f64]; K]) {
+    match *monic {
+        [] | [_] => {}
+        [_, a] => divide_by(signals, [a]),
+        [_, a, b] => divide_by(signals, [a, b]),
+        [_, a, b, c] => divide_by(signals, [a, b, c]),
+        [_, a, b, c, d] => divide_by(signals, [a, b, c, d]),
+        [_, ref weights @ ..] => signals.into_iter().for_each(|values| divide_from(weights, &[], values)),
+    }
+}
+
+/// The same for a few weights, with the past in registers.
+fn divide_by<const K: usize, const N: usize>(mut signals: [&mut [f64]; K], weights: [f64; N]) {
+    let length = signals.iter().map(|values| values.len()).min().unwrap_or(0);
+    let mut pasts = [[0.0; N]; K];
+    for t in 0..length {
+        for (values, past) in signals.iter_mut().zip(&mut pasts) {
+            // The latest value comes last: only its product and one subtraction wait for the sample before.
+            let mut sum = values[t];
+            for k in (0..N).rev() {
+                sum -= weights[k] * past[k];
+            }
+            // By hand: `rotate_right` moves memory, which the next sample would wait for.
+            for k in (1..N).rev() {
+                past[k] = past[k - 1];
+            }
+            past[0] = sum;
+            values[t] = sum;
+        }
+    }
+}
+
+/// x = w/A in place, `before` holding the x before the first, the latest last; what is not there is zero.
+pub fn divide_from(weights: &[f64], before: &[f64], values: &mut [f64]) {
+    let order = weights.len();
+    let start = order.min(values.len());
+    for t in 0..start {
+        let earlier = values[..t].iter().rev().chain(before.iter().rev());
+        let sum: f64 = weights.iter().zip(earlier).map(|(a, x)| a * x).sum();
+        values[t] -= sum;
+    }
+    for t in start..values.len() {
+        let (earlier, now) = values.split_at_mut(t);
+        let sum: f64 = weights.iter().zip(earlier[t - order..].iter().rev()).map(|(a, x)| a * x).sum();
+        now[0] -= sum;
+    }
+}

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemUse, UseTree, Visibility};
@@ -384,4 +385,41 @@ fn libraries_name_no_options() {
         options("leave out --split (--validate), a--b, -- and 1 --2").collect::<Vec<_>>(),
         ["split", "validate"]
     );
+}
+
+/// The features of each package, once for each set of them, as `cargo tree` says for these packages.
+fn features(packages: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
+    let tree = ["tree", "--locked", "--offline", "--no-dedupe", "--prefix", "none", "--format", "{p}|{f}"];
+    let said = Command::new(env!("CARGO"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(tree)
+        .args(packages)
+        .output()
+        .expect("cargo");
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+    let mut features = BTreeMap::<String, BTreeSet<String>>::new();
+    for line in String::from_utf8_lossy(&said.stdout).lines() {
+        let (package, own) = line.split_once('|').unwrap_or((line, ""));
+        features.entry(package.to_owned()).or_default().insert(own.to_owned());
+    }
+    features
+}
+
+/// One feature more in one of them compiles its crate, and all that depend on it, once more.
+#[test]
+fn the_program_the_module_and_the_tests_are_built_of_the_same_crates() {
+    let module = features(&["--package", "thetahat-py", "--edges", "normal,build"]);
+    let program = features(&["--edges", "normal,build"]);
+    let tests = features(&["--workspace", "--all-features", "--edges", "normal,build,dev"]);
+    assert!(module.len() > 100, "{module:?}");
+    // Tests may have what macros are built of once more.
+    for (others, name, more) in [(program, "the program", false), (tests, "the tests", true)] {
+        let wrong: Vec<String> = module
+            .iter()
+            .filter_map(|(package, own)| Some((package, own, others.get(package)?)))
+            .filter(|(_, own, other)| if more { !own.is_subset(other) } else { own != other })
+            .map(|(package, own, other)| format!("{package}: {own:?} in the module, {other:?} in {name}"))
+            .collect();
+        assert_eq!(wrong, Vec::<String>::new());
+    }
 }

@@ -273,7 +273,8 @@ impl<S: Number<f64>> Chain<S> {
 }
 
 impl<S: Number<f64>> Transition<S> {
-    /// The state after it.
+    /// The state after it. Inlined, so that loops over samples do not call it.
+    #[inline]
     pub(crate) fn apply(&self, state: &State<S>, u: f64) -> State<S> {
         let n = self.states;
         let mut next = [S::from(0.0); MOST_STATES];
@@ -287,6 +288,7 @@ impl<S: Number<f64>> Transition<S> {
     }
 
     /// What it makes of one state, without an input; and of the input.
+    #[inline]
     pub(crate) fn entry(&self, row: usize, column: usize) -> S {
         self.matrix[row][column]
     }

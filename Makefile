@@ -1,4 +1,4 @@
-.PHONY: demo check test test-long format lint docs unit rust core chromium arm embedded images python wheel soak soak-track monte-carlo bench build-cost
+.PHONY: demo check test test-long format lint docs unit rust core chromium arm embedded images python wheel soak soak-track monte-carlo exports bench build-cost
 
 # Fit the sample log that the program carries.
 demo:
@@ -11,8 +11,8 @@ check: format lint unit
 # skipped by name, or fails where CI=true.
 test: format lint docs rust embedded python
 
-# What takes long, beside that: the core on its own, images for more processors, endurance, and simulated logs by the score.
-test-long: core images soak soak-track monte-carlo
+# What takes long, beside that: the core on its own, images for more processors, endurance, simulated logs and random exports by the score.
+test-long: core images soak soak-track monte-carlo exports
 
 format:
 	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers examples/self_tuning_heater tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
@@ -76,6 +76,10 @@ soak-track:
 monte-carlo:
 	MONTE_CARLO=200 cargo test --locked --release -p thetahat --test monte_carlo -- --nocapture
 	MONTE_CARLO=2000 cargo test --locked --release -p thetahat --test residual_tests -- --nocapture
+
+# Random equations as source code: it compiles, and says what the library does.
+exports:
+	EXPORTS=100 cargo test --locked --workspace --all-features --test end_to_end -- --nocapture whatever_the_equations
 
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:

@@ -9,7 +9,7 @@ use crate::c_library::{Precision, done, library};
 use crate::harness::Folder;
 
 /// What C has to be compiled with.
-const STRICT: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"];
+const STRICT: [&str; 7] = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror", "-O2"];
 
 /// Whether a program is there. Where the tests must not skip anything it has to be.
 fn has(program: &str) -> bool {
@@ -31,10 +31,10 @@ fn core() -> &'static Path {
     })
 }
 
-/// Links a generated module of Rust with the core, and runs it.
+/// Links a generated module of Rust with the core, and runs it. Clippy has nothing to say of it.
 fn rustc(folder: &Folder, name: &str) {
     let text = folder.read(&format!("{name}.rs"));
-    let mut command = Command::new("rustc");
+    let mut command = Command::new(if has("clippy-driver") { "clippy-driver" } else { "rustc" });
     command.current_dir(folder.path(".")).args(["--edition=2024", "-D", "warnings", "-C", "opt-level=1"]);
     if text.contains("thetahat_core") {
         let library = newest(core(), "libthetahat_core-").expect("the core was built for this test");
@@ -59,15 +59,21 @@ fn newest(folder: &Path, begins: &str) -> Option<PathBuf> {
 
 /// Exports a model in every way, compiles it, and steps it along a log.
 fn goes_round(folder: &Folder, report: &str, log: &str, purposes: &[&str]) {
-    for (purpose, precision) in purposes.iter().flat_map(|purpose| [(purpose, "f64"), (purpose, "f32")]) {
-        let common = format!("export {report} {log} --what {purpose} --precision {precision} --name model");
-        let exported = folder.done(&format!("{common} --to rust"));
-        assert!(!exported.stderr.contains("warning"), "{}", exported.stderr);
-        rustc(folder, "model");
-        folder.done(&format!("{common} --to c"));
-        if has("gcc") {
-            gcc(folder, precision);
+    for purpose in purposes {
+        for precision in ["f64", "f32"] {
+            goes_round_once(folder, report, log, purpose, precision);
         }
+    }
+}
+
+fn goes_round_once(folder: &Folder, report: &str, log: &str, purpose: &str, precision: &str) {
+    let common = format!("export {report} {log} --what {purpose} --precision {precision} --name model");
+    let exported = folder.done(&format!("{common} --to rust"));
+    assert!(!exported.stderr.contains("warning"), "{}", exported.stderr);
+    rustc(folder, "model");
+    folder.done(&format!("{common} --to c"));
+    if has("gcc") {
+        gcc(folder, precision);
     }
 }
 
@@ -189,6 +195,140 @@ fn models_in_equations_say_what_the_library_does() {
     );
     folder.done("fit --grey speed.toml log.csv --time t --report r.json");
     goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
+}
+
+/// Equations of so many states and inputs, random but stable, with a log along which they run.
+fn random_equations(seed: u32) -> (String, String) {
+    let mut random = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
+    let mut below = |count: usize| {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (random >> 8) as usize % count
+    };
+    let (states, inputs, outputs, substeps) = (1 + below(6), below(4), 1 + below(2), 1 + below(3));
+    let kind = ["derivative", "next"][below(2)];
+    let line = |text: &mut String, line: String| *text += &(line + "\n");
+    let mut text = String::from("sample_time = 0.1\n");
+    if kind == "derivative" {
+        line(&mut text, format!("substeps = {substeps}"));
+    }
+    text += "[states]\n";
+    (1..=states).for_each(|i| line(&mut text, format!("x{i} = {{ start = 0.{i}, sd = 1 }}")));
+    text += "[inputs]\n";
+    (1..=inputs).for_each(|i| line(&mut text, format!("u{i} = 'u{i}'")));
+    text += "[parameters]\ngain = { start = 0.5, sd = 1, unknown = true }\n";
+    line(&mut text, format!("[{kind}]"));
+    for i in 1..=states {
+        let other = 1 + below(states);
+        let function = ["sin", "tanh", "atan", "abs"][below(4)];
+        let driven =
+            if inputs > 0 { format!(" + gain * u{}", 1 + below(inputs)) } else { " + gain".to_owned() };
+        line(&mut text, format!("x{i} = '-0.{} * x{i} + 0.1 * {function}(x{other}){driven}'", 1 + below(8)));
+    }
+    text += "[outputs]\n";
+    (1..=outputs).for_each(|i| line(&mut text, format!("y{i} = 'x{} + 0 * t'", 1 + below(states))));
+    let each = |letter: char, count: usize, value: &str| {
+        (1..=count).map(|i| format!("{letter}{i} = {value}")).collect::<Vec<_>>().join(", ")
+    };
+    let (process, measurement) = (each('x', states, "0.01"), each('y', outputs, "0.1"));
+    line(&mut text, format!("[noise]\nprocess = {{ {process} }}\nmeasurement = {{ {measurement} }}"));
+
+    let names = (1..=inputs).map(|i| format!("u{i}")).chain((1..=outputs).map(|i| format!("y{i}")));
+    let mut log = format!("t,{}\n", names.collect::<Vec<_>>().join(","));
+    for row in 0..60 {
+        let cells = (0..inputs + outputs).map(|_| format!("{}", below(2001) as f64 / 1000.0 - 1.0));
+        line(&mut log, format!("{:.1},{}", f64::from(row) * 0.1, cells.collect::<Vec<_>>().join(",")));
+    }
+    (text, log)
+}
+
+/// EXPORTS says how many; of each one purpose in one precision, in both languages.
+#[test]
+fn whatever_the_equations_what_is_exported_compiles_and_says_what_the_library_does() {
+    let count = std::env::var("EXPORTS").map_or(4, |count| count.parse().expect("EXPORTS: a number"));
+    for seed in 0..count {
+        let (model, log) = random_equations(seed);
+        let folder = Folder::with_log(log);
+        folder.write("model.toml", &model);
+        folder.done("fit --grey model.toml log.csv --time t --max-iterations 2 --report r.json");
+        let purpose = ["observer", "predictor", "simulator"][seed as usize % 3];
+        let precision = ["f64", "f32"][seed as usize / 3 % 2];
+        goes_round_once(&folder, "r.json", "log.csv --time t", purpose, precision);
+    }
+}
+
+#[test]
+fn a_map_of_one_box_and_loops_in_loops_have_names() {
+    let folder = motor();
+    folder.done("fit dc_motor.csv --time t --narx local --ny 1 --nu 1 --estimate 1..60 --report r.json");
+    goes_round(&folder, "r.json", "dc_motor.csv --time t", &["predictor"]);
+    let text =
+        include_str!("data/dc_motor.toml").replace("sample_time = 0.01", "sample_time = 0.01\nsubsteps = 2");
+    folder.write("motor.toml", text);
+    folder.write("motor.csv", include_str!("data/dc_motor.csv"));
+    folder.done("fit --grey motor.toml motor.csv --time t --estimate 1..500 --report r.json");
+    goes_round_once(&folder, "r.json", "motor.csv --time t", "observer", "f32");
+}
+
+#[test]
+fn numbers_beyond_single_precision_are_refused_there() {
+    let folder = Folder::with_log(include_str!("data/dc_motor.csv"));
+    folder.done("fit log.csv --time t -u u -y speed --model ss --order 2 --report r.json");
+    let report = folder.read("r.json");
+    let mut document: serde_json::Value = serde_json::from_str(&report).expect("a document");
+    document["model"]["k"][0][0] = 1e308.into();
+    folder.write("k.json", document.to_string());
+    for language in ["c", "rust"] {
+        let message = folder.refused(
+            &format!("export k.json --to {language} --what predictor --precision f32 --name model"),
+            2,
+        );
+        assert!(message.contains("e307") && message.contains("single precision"), "{message}");
+        assert!(!folder.path("model.h").exists() && !folder.path("model.rs").exists());
+    }
+}
+
+/// Steps one model along a sample that is infinite, another along one that is NaN: what they say afterwards is the same.
+const TWO_MODELS: &str = "
+#include \"model.h\"
+#include <math.h>
+int main(void)
+{
+    model_state one, other;
+    model_init(&one);
+    model_init(&other);
+    for (int k = 0; k < 50; k += 1) {
+        const double given[2][1] = {{k == 9 ? INFINITY : 1.0}, {k == 9 ? NAN : 1.0}};
+        const double measured[2][1] = {{k == 19 ? -INFINITY : 2.0}, {k == 19 ? NAN : 2.0}};
+        double y[2][1];
+        model_predict(&one, given[0], y[0]);
+        model_predict(&other, given[1], y[1]);
+        model_update(&one, measured[0]);
+        model_update(&other, measured[1]);
+        if (!isfinite(y[0][0]) || !(y[0][0] >= y[1][0] && y[0][0] <= y[1][0])) {
+            return 1;
+        }
+    }
+    return 0;
+}
+";
+
+#[test]
+fn infinity_is_a_missing_number_and_a_compiler_that_does_not_see_it_is_refused() {
+    if !has("gcc") {
+        return;
+    }
+    let folder = motor();
+    for orders in ["--na 2 --nb 2 --nk 3", "--model bj --nb 2 --nc 1 --nd 2 --nf 2", "--model ss --order 2"] {
+        folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
+        folder.done("export r.json --to c --what predictor --precision f64 --name model");
+        folder.write("model_test.c", TWO_MODELS);
+        gcc(&folder, "f64");
+        let mut fast = Command::new("gcc");
+        fast.current_dir(folder.path(".")).args(["-std=c99", "-ffast-math", "-c", "model.c"]);
+        let refused = fast.output().expect("gcc");
+        assert!(!refused.status.success());
+        assert!(String::from_utf8_lossy(&refused.stderr).contains("-ffast-math"));
+    }
 }
 
 #[test]

@@ -149,6 +149,23 @@ impl Precision {
             Self::F64 => value,
         }
     }
+
+    /// That finite numbers, by the names that the source gives them, are finite in it.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] with the first that is not.
+    fn check<'a>(self, numbers: impl IntoIterator<Item = (&'a str, &'a [f64])>) -> Result<(), Error> {
+        let is_lost = |value: &&f64| value.is_finite() && !self.rounded(**value).is_finite();
+        for (name, values) in numbers {
+            if let Some(value) = values.iter().find(is_lost) {
+                let message = format!(
+                    "{name} has the number {value:e}, which single precision does not hold; take f64"
+                );
+                return Err(Error::argument("precision", message));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What to write.
@@ -222,6 +239,7 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
         return recursive::exported(report, plan, log);
     }
     let form = form(model, plan.purpose)?;
+    plan.precision.check(form.program.constants())?;
     let head = Head::new(report, plan, &form.equations, &form.start)?;
     let Plan { language, precision, name, .. } = plan;
     if *language == Language::C && form.program.maps.iter().any(|map| map.statements.is_none()) {
@@ -259,6 +277,7 @@ pub fn export_controller(document: &Control, plan: &Plan) -> Result<Exported, Er
         return Err(refused(plan.purpose, "a controller", "controller"));
     }
     let controller = Controller::new(document)?;
+    plan.precision.check(controller.constants())?;
     let head = Head::of_controller(document)?;
     let files = match plan.language {
         Language::C => c::files(&controller::program(&controller), &plan.name, plan.precision, &head),

@@ -6,6 +6,13 @@ use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
 
+/// gcc and clang tell by these names that every number is taken for finite.
+const FINITE_MATH: &str = "
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#error \"A missing number is not finite, which is not seen with -ffast-math or -ffinite-math-only: compile this file without them.\"
+#endif
+";
+
 /// The header and the source.
 pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &Head) -> Vec<ExportedFile> {
     let mut program = program.clone();
@@ -27,15 +34,18 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
 
     let mut functions = String::new();
     for entry in &entries {
-        let body = writer.statements(&entry.body, "    ");
+        let body = writer.block(&entry.body, "    ");
         functions += &format!("\n{}\n{{\n{body}}}\n", prototype(&program, entry, name, &writer));
     }
     let mut source = format!("// See {name}.h.\n\n#include \"{name}.h\"\n\n");
-    if functions.contains("isnan(") || program.calls {
+    if functions.contains("isfinite(") || program.calls {
         source += "#include <math.h>\n";
     }
     if functions.contains("size_t") {
         source += "#include <stddef.h>\n";
+    }
+    if functions.contains("isfinite(") {
+        source += FINITE_MATH;
     }
     // What only a constant of the core reads is not there.
     let is_read =

@@ -11,7 +11,7 @@ use thetahat_core::nalgebra::DVector;
 
 use super::head::Head;
 use super::program::{Condition, Entry, Index, Kind, Program, Statement, Value, Variable};
-use super::rust::type_name;
+use super::rust::{LINTS, type_name};
 use super::signals::levels;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Plan};
@@ -56,6 +56,18 @@ impl Controller {
             offsets: [level, working],
         })
     }
+
+    /// Its numbers, by the names that the source gives them.
+    pub(super) fn constants(&self) -> [(&str, &[f64]); 6] {
+        [
+            ("GAIN", std::slice::from_ref(&self.gain)),
+            ("R", &self.r),
+            ("S", &self.s),
+            ("OBSERVER", &self.observer),
+            ("the limits of the input", &self.limits),
+            ("the working point", &self.offsets),
+        ]
+    }
 }
 
 /// The program of a controller: `control` and `applied`.
@@ -99,12 +111,11 @@ pub(super) fn program(controller: &Controller) -> Program {
     then.push(Statement::Store(z, (n - 1).into(), of_wanted + of_input));
     then.push(Statement::Store(latest, 0.into(), input.into()));
     let said = program.variable("said");
-    // What is not finite has a difference to itself that is no number.
     let mut body = vec![
         Statement::Let(reference, set_point.at(0) - *working),
         Statement::Let(y, measured.at(0) - *working),
         Statement::Let(wanted, gained() - s.at(0) * y + z.at(0)),
-        Statement::unless_missing(wanted - Value::from(wanted), then),
+        Statement::unless_missing(wanted.into(), then),
         Statement::Let(said, latest.at(0) + *level),
     ];
     // A sum may be rounded to beyond a limit.
@@ -144,7 +155,7 @@ pub(super) fn program(controller: &Controller) -> Program {
         result: None,
         body: vec![
             Statement::Let(change, told.at(0) - *level - latest.at(0)),
-            Statement::unless_missing(change - Value::from(change), then),
+            Statement::unless_missing(change.into(), then),
         ],
     };
     program.entries = vec![control, applied];
@@ -163,7 +174,7 @@ pub(super) fn rust(controller: &Controller, plan: &Plan, head: &Head) -> Exporte
     let program = Program::default();
     let writer = Writer::new(&program, Language::Rust, plan.precision);
     let (real, name, n) = (writer.real(), type_name(&plan.name), s.len());
-    let mut text = head.comments();
+    let mut text = head.comments() + LINTS;
     text += "\nuse thetahat_core::nalgebra::{Const, SVector};\nuse thetahat_core::{Error, RstController};\n";
     for (name, doc, values) in [
         ("R", "R without its leading 1.", r),

@@ -54,7 +54,7 @@ impl Head {
             );
         } else if !model.inputs().is_empty() {
             lines.push(
-                "An input that is missing (NaN) keeps its value before, the first ones their offset."
+                "A number that is not finite is missing: an input keeps its value before, the first ones their offset."
                     .to_owned(),
             );
         }

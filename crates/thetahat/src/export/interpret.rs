@@ -72,7 +72,7 @@ impl Machine {
                 }
                 Statement::Choose { condition, then, otherwise } => {
                     let holds = match condition {
-                        Condition::Missing(value) => self.value(value).is_nan(),
+                        Condition::Missing(value) => !self.value(value).is_finite(),
                         Condition::Less(one, other) => self.value(one) < self.value(other),
                         Condition::AtMost(one, other) => self.value(one) <= self.value(other),
                     };

@@ -170,7 +170,7 @@ impl Neg for Value {
 /// What a branch is taken for.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Condition {
-    /// The number is none.
+    /// The number is not finite.
     Missing(Value),
     Less(Value, Value),
     AtMost(Value, Value),
@@ -295,6 +295,11 @@ impl Program {
         if let Some(table) = self.arrays.get_mut(table.0) {
             table.group = group;
         }
+    }
+
+    /// The numbers that it holds, by the names of their arrays.
+    pub(super) fn constants(&self) -> impl Iterator<Item = (&str, &[f64])> {
+        self.arrays.iter().map(|array| (array.name.as_str(), array.values.as_slice()))
     }
 
     pub(super) fn length(&self, array: Array) -> usize {

@@ -50,6 +50,19 @@ impl Start {
         })
     }
 
+    /// Its numbers, with what they are.
+    fn constants(&self) -> [(&str, &[f64]); 7] {
+        [
+            ("the parameters", &self.parameters),
+            ("their covariance", self.factor.as_slice()),
+            ("the noise variance", std::slice::from_ref(&self.noise_variance)),
+            ("the scale of an input", &self.scales.inputs),
+            ("the scale of the output", std::slice::from_ref(&self.scales.output)),
+            ("the offset of an input", &self.offsets.inputs),
+            ("the offset of the output", std::slice::from_ref(&self.offsets.output)),
+        ]
+    }
+
     fn input_orders(&self) -> Vec<InputOrders> {
         self.orders.nb.iter().zip(&self.orders.nk).map(|(&nb, &nk)| InputOrders { nb, nk }).collect()
     }
@@ -110,6 +123,7 @@ pub(super) fn exported(
     log: Option<(&Log, &[Rows])>,
 ) -> Result<Exported, Error> {
     let start = Start::new(report)?;
+    plan.precision.check(start.constants())?;
     if plan.language == Language::C {
         c::check_sizes(&start)?;
     }

@@ -6,11 +6,15 @@ use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
 
+/// What clippy says of numbers that were estimated, and of loops that are those of C.
+pub(super) const LINTS: &str =
+    "#![allow(clippy::approx_constant, clippy::manual_memcpy, clippy::needless_range_loop)]\n";
+
 /// The module.
 pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &Head) -> ExportedFile {
     let mut writer = Writer::new(program, Language::Rust, precision);
     let real = writer.real();
-    let mut text = head.comments();
+    let mut text = head.comments() + LINTS;
     text += &uses(program);
     let mut functions = String::new();
     for entry in &program.entries {
@@ -77,7 +81,7 @@ fn function(program: &Program, entry: &Entry, writer: &mut Writer<'_>) -> String
     if let Some(Declared { name, values, .. }) = result {
         text += &format!("        let mut {name}: [{real}; {}] = [0.0; {}];\n", values.len(), values.len());
     }
-    text += &writer.statements(&entry.body, "        ");
+    text += &writer.block(&entry.body, "        ");
     if let Some(Declared { name, .. }) = result {
         text += &format!("        {name}\n");
     }
@@ -149,7 +153,7 @@ pub(super) fn check(program: &Program, name: &str, precision: Precision, vector:
     let writer = Writer::new(program, Language::Rust, precision);
     let (real, rows, outputs) = (writer.real(), vector.rows(), vector.expected.len());
     let mut text = format!(
-        "// Steps {name}.rs along the rows of {name}.csv, and panics if an output is wrong.\n\n#[path = \"{name}.rs\"]\nmod {name};\n\n"
+        "// Steps {name}.rs along the rows of {name}.csv, and panics if an output is wrong.\n\n{LINTS}\n#[path = \"{name}.rs\"]\nmod {name};\n\n"
     );
     text += &format!(
         "/// {}\nconst TOLERANCE: {real} = {};\n",

@@ -7,7 +7,7 @@ use crate::model::{Model, Signal};
 /// What functions of programs do.
 pub(super) const FREE_RUN: &str = "The next sample: takes u(k), and gives y(k) of the free run.";
 pub(super) const PREDICTION: &str = "The next sample: takes u(k), and gives the prediction of y(k) from it and from what was measured before.";
-pub(super) const UPDATE: &str = "What was measured in this sample, after its prediction. Where it is missing (NaN) the prediction stands for it.";
+pub(super) const UPDATE: &str = "What was measured in this sample, after its prediction. Where it is missing (not finite) the prediction stands for it.";
 
 /// The signals of a program.
 #[derive(Debug, Clone, Copy)]

@@ -20,11 +20,13 @@ pub(super) struct Writer<'p> {
     precision: Precision,
     /// The counters of the loops that are open.
     open: Vec<Counter>,
+    /// The variables that the blocks around the next statement have declared, each block its own.
+    declared: Vec<Vec<Variable>>,
 }
 
 impl<'p> Writer<'p> {
     pub(super) fn new(program: &'p Program, language: Language, precision: Precision) -> Self {
-        Self { program, language, precision, open: Vec::new() }
+        Self { program, language, precision, open: Vec::new(), declared: Vec::new() }
     }
 
     /// The type of numbers.
@@ -41,6 +43,9 @@ impl<'p> Writer<'p> {
     pub(super) fn number(&self, value: f64) -> String {
         match (self.language, self.precision) {
             (Language::C, _) if value.is_nan() => "NAN".to_owned(),
+            (Language::C, _) if value.is_infinite() => {
+                format!("{}INFINITY", if value < 0.0 { "-" } else { "" })
+            }
             (Language::Rust, _) if value.is_nan() => format!("{}::NAN", self.real()),
             (Language::Rust, _) if value.is_infinite() => {
                 format!("{}::{}INFINITY", self.real(), if value < 0.0 { "NEG_" } else { "" })
@@ -66,8 +71,16 @@ impl<'p> Writer<'p> {
         format!("{open}\n{}{indent}{close}", lines.concat())
     }
 
-    /// Statements, indented.
-    pub(super) fn statements(&mut self, statements: &[Statement], indent: &str) -> String {
+    /// A block of statements, indented.
+    pub(super) fn block(&mut self, statements: &[Statement], indent: &str) -> String {
+        self.declared.push(Vec::new());
+        let text = self.statements(statements, indent);
+        self.declared.pop();
+        text
+    }
+
+    /// Statements of the block that is open.
+    fn statements(&mut self, statements: &[Statement], indent: &str) -> String {
         let mut text = String::new();
         for statement in statements {
             self.statement(statement, statements, indent, &mut text);
@@ -80,6 +93,9 @@ impl<'p> Writer<'p> {
         let c = self.language == Language::C;
         // Writing to a string cannot fail.
         let _ = match statement {
+            Statement::Let(variable, value) if self.declares_again(*variable) => {
+                writeln!(text, "{indent}{}", self.assigned(self.name(*variable), value))
+            }
             Statement::Let(variable, value) => {
                 let (name, value) = (self.name(*variable), self.value(value));
                 let real = self.real();
@@ -92,16 +108,16 @@ impl<'p> Writer<'p> {
                 }
             }
             Statement::Set(variable, value) => {
-                writeln!(text, "{indent}{} = {};", self.name(*variable), self.value(value))
+                writeln!(text, "{indent}{}", self.assigned(self.name(*variable), value))
             }
             Statement::Store(array, index, value) => {
                 let place = self.value(&Value::At(*array, index.clone()));
-                writeln!(text, "{indent}{place} = {};", self.value(value))
+                writeln!(text, "{indent}{}", self.assigned(&place, value))
             }
             Statement::Repeat { counter, times, body } => {
                 self.open.push(*counter);
                 let name = self.counter(*counter);
-                let written = self.statements(body, &inner);
+                let written = self.block(body, &inner);
                 self.open.pop();
                 let head = match self.language {
                     Language::C => format!("for (size_t {name} = 0U; {name} < {times}U; {name} += 1U)"),
@@ -117,10 +133,10 @@ impl<'p> Writer<'p> {
                 }
                 let condition = self.condition(condition, holds);
                 let head = if c { format!("if ({condition})") } else { format!("if {condition}") };
-                let body = self.statements(then, &inner);
+                let body = self.block(then, &inner);
                 let mut tail = String::new();
                 if !otherwise.is_empty() {
-                    tail = format!(" else {{\n{}{indent}}}", self.statements(otherwise, &inner));
+                    tail = format!(" else {{\n{}{indent}}}", self.block(otherwise, &inner));
                 }
                 writeln!(text, "{indent}{head} {{\n{body}{indent}}}{tail}")
             }
@@ -146,11 +162,26 @@ impl<'p> Writer<'p> {
         };
     }
 
+    /// Gives a place a value: by `+=` and its like where it is made of what stands there.
+    fn assigned(&self, place: &str, value: &Value) -> String {
+        if let Value::Binary(operation, one, other) = value {
+            let sign = sign(*operation);
+            if self.value(one) == place {
+                return format!("{place} {sign}= {};", self.value(other));
+            }
+            let commutes = matches!(operation, Operation::Add | Operation::Multiply);
+            if commutes && self.value(other) == place {
+                return format!("{place} {sign}= {};", self.value(one));
+            }
+        }
+        format!("{place} = {};", self.value(value))
+    }
+
     fn condition(&self, condition: &Condition, holds: bool) -> String {
-        let not = if holds { "" } else { "!" };
+        let is = if holds { "!" } else { "" };
         match (condition, self.language) {
-            (Condition::Missing(value), Language::C) => format!("{not}isnan({})", self.value(value)),
-            (Condition::Missing(value), Language::Rust) => format!("{not}{}.is_nan()", self.nested(value)),
+            (Condition::Missing(value), Language::C) => format!("{is}isfinite({})", self.value(value)),
+            (Condition::Missing(value), Language::Rust) => format!("{is}{}.is_finite()", self.nested(value)),
             (Condition::Less(one, other), _) => self.comparison(one, "<", other, holds),
             (Condition::AtMost(one, other), _) => self.comparison(one, "<=", other, holds),
         }
@@ -165,9 +196,22 @@ impl<'p> Writer<'p> {
         self.program.variables.get(variable.0).map_or("", String::as_str)
     }
 
-    fn counter(&self, counter: Counter) -> &'static str {
-        let depth = self.open.iter().position(|open| *open == counter);
-        depth.and_then(|depth| COUNTERS.get(depth)).copied().unwrap_or("")
+    /// Whether the open block has this variable already: a loop of one turn stands in the block around it. Notes it else.
+    fn declares_again(&mut self, variable: Variable) -> bool {
+        let Some(own) = self.declared.last_mut() else { return false };
+        let again = own.contains(&variable);
+        if !again {
+            own.push(variable);
+        }
+        again
+    }
+
+    /// The name of a counter by the depth of its loop: i, j, k, n, n2, n3 …
+    fn counter(&self, counter: Counter) -> String {
+        let depth = self.open.iter().position(|open| *open == counter).unwrap_or(self.open.len());
+        let last = COUNTERS.len() - 1;
+        let number = if depth > last { (depth - last + 1).to_string() } else { String::new() };
+        format!("{}{number}", COUNTERS[depth.min(last)])
     }
 
     fn index(&self, Index { constant, terms }: &Index) -> String {
@@ -210,13 +254,7 @@ impl<'p> Writer<'p> {
             }
             Value::Negative(value) => format!("-{}", self.nested(value)),
             Value::Binary(operation, one, other) => {
-                let sign = match operation {
-                    Operation::Add => '+',
-                    Operation::Subtract => '-',
-                    Operation::Multiply => '*',
-                    Operation::Divide => '/',
-                };
-                format!("{} {sign} {}", self.nested(one), self.nested(other))
+                format!("{} {} {}", self.nested(one), sign(*operation), self.nested(other))
             }
             Value::Call(function, arguments) => {
                 let single = self.precision == Precision::F32;
@@ -244,12 +282,14 @@ impl<'p> Writer<'p> {
 
 /// Whether statements give a variable another value.
 fn sets(statements: &[Statement], variable: Variable) -> bool {
-    statements.iter().any(|statement| match statement {
-        Statement::Set(own, _) => *own == variable,
-        Statement::Repeat { body, .. } => sets(body, variable),
-        Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
-        Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
-    })
+    let is_first = |statement: &&Statement| matches!(statement, Statement::Let(own, _) if *own == variable);
+    statements.iter().filter(is_first).count() > 1
+        || statements.iter().any(|statement| match statement {
+            Statement::Set(own, _) => *own == variable,
+            Statement::Repeat { body, .. } => sets(body, variable),
+            Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
+            Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
+        })
 }
 
 /// Whether statements say which turn it is.
@@ -280,6 +320,15 @@ fn reads(value: &Value, of: &impl Fn(&Index) -> bool) -> bool {
         Value::Negative(own) => reads(own, of),
         Value::Binary(_, one, other) => reads(one, of) || reads(other, of),
         Value::Call(_, arguments) => arguments.iter().any(|own| reads(own, of)),
+    }
+}
+
+fn sign(operation: Operation) -> char {
+    match operation {
+        Operation::Add => '+',
+        Operation::Subtract => '-',
+        Operation::Multiply => '*',
+        Operation::Divide => '/',
     }
 }
 

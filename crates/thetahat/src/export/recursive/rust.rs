@@ -2,7 +2,7 @@
 
 use super::super::head::Head;
 use super::super::program::Program;
-use super::super::rust::type_name;
+use super::super::rust::{LINTS, type_name};
 use super::super::vector::Columns;
 use super::super::writer::Writer;
 use super::super::{ExportedFile, Language, Plan};
@@ -42,7 +42,7 @@ pub(super) fn file(start: &Start, plan: &Plan, head: &Head) -> ExportedFile {
         }
         false => ("", String::new()),
     };
-    let mut text = head.comments();
+    let mut text = head.comments() + LINTS;
     text += &format!(
         "\nuse thetahat_core::nalgebra::{{Const, SMatrix, SVector}};\nuse thetahat_core::{{{imports}, Covariance, Error, Forgetting, {input_orders_used}Innovation, {kind}}};\n\n"
     );
@@ -103,7 +103,7 @@ pub(super) fn check(plan: &Plan, columns: &Columns, errors: &[f64]) -> ExportedF
     let (real, name, rows, inputs) = (writer.real(), &plan.name, columns.rows(), columns.inputs.len());
     let mut text = format!(
         "// Steps {name}.rs along the rows of {name}.csv, where expected1 is the error of each, and panics if one is wrong.\n\n\
-         #[path = \"{name}.rs\"]\nmod {name};\n\nuse thetahat_core::{{Error, Forgetting}};\n\n\
+         {LINTS}\n#[path = \"{name}.rs\"]\nmod {name};\n\nuse thetahat_core::{{Error, Forgetting}};\n\n\
          /// u(k), y(k) and the error.\nstatic ROWS: [([{real}; {inputs}], {real}, {real}); {rows}] = [\n"
     );
     for (row, error) in errors.iter().enumerate() {

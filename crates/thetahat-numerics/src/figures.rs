@@ -10,7 +10,7 @@ const UNKNOWN: &str = "unknown";
 /// A number to six significant digits, as tables and pages write it.
 ///
 /// ```
-/// use thetahat::figures::number;
+/// use thetahat_numerics::figures::number;
 ///
 /// assert_eq!(number(18.9182446), "18.9182");
 /// assert_eq!(number(-2.5e-7), "-2.50000e-7");
@@ -31,7 +31,7 @@ pub fn number(value: f64) -> String {
 /// [`number`] without zeros at its end.
 ///
 /// ```
-/// use thetahat::figures::short;
+/// use thetahat_numerics::figures::short;
 ///
 /// assert_eq!([short(0.0800000001), short(2.5e-7), short(1e9)], ["0.08", "2.5e-7", "1e9"]);
 /// ```
@@ -47,7 +47,7 @@ pub fn short(value: f64) -> String {
 /// A number with this many decimals; as [`number`] where that is too wide.
 ///
 /// ```
-/// use thetahat::figures::fixed;
+/// use thetahat_numerics::figures::fixed;
 ///
 /// assert_eq!([fixed(98.0602, 3), fixed(-1e160, 3)], ["98.060", "-1.00000e160"]);
 /// ```
@@ -59,7 +59,7 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 /// A number in powers of ten with this many decimals, or as many of them as there is room for.
 ///
 /// ```
-/// use thetahat::figures::scientific;
+/// use thetahat_numerics::figures::scientific;
 ///
 /// assert_eq!([scientific(0.012345, 2), scientific(-1e-300, 5)], ["1.23e-2", "-1.0000e-300"]);
 /// ```
@@ -77,7 +77,7 @@ pub fn scientific(value: f64, decimals: usize) -> String {
 /// A standard error: three digits.
 ///
 /// ```
-/// assert_eq!(thetahat::figures::error(0.0110412), "1.10e-2");
+/// assert_eq!(thetahat_numerics::figures::error(0.0110412), "1.10e-2");
 /// ```
 pub fn error(value: f64) -> String {
     scientific(value, 2)
@@ -86,7 +86,7 @@ pub fn error(value: f64) -> String {
 /// Three digits: a ratio, or a probability.
 ///
 /// ```
-/// use thetahat::figures::three;
+/// use thetahat_numerics::figures::three;
 ///
 /// assert_eq!([three(0.0), three(0.012_34), three(1.0), three(1e-9)], ["0", "0.0123", "1.00", "1.00e-9"]);
 /// ```
@@ -101,7 +101,7 @@ pub fn three(value: f64) -> String {
 /// A p-value, or another probability that may be small.
 ///
 /// ```
-/// use thetahat::figures::chance;
+/// use thetahat_numerics::figures::chance;
 ///
 /// assert_eq!([chance(0.593_91), chance(8.5e-7), chance(0.0)], ["0.5939", "8.5e-7", "<1e-300"]);
 /// ```

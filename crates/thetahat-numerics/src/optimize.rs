@@ -35,7 +35,7 @@
 //! - the change of theta: with s = G^-1 g the decrease is s'G s, which is J/N times the squared length of s in standard errors. With a
 //!   tolerance of 1e-8 and 1000 samples no combination of parameters is further than 0.003 standard errors from the minimum;
 //! - the gradient: the decrease is the square of its norm in the metric G^-1, whatever the units of the parameters. How large it
-//!   is at the end, a report says ([`SearchOutcome::gradient_norm`](crate::estimate::SearchOutcome::gradient_norm)).
+//!   is at the end, a report says (`gradient_norm`).
 //!
 //! A cost that no step lowers further ends a search too: at what rounding allows it has converged, else there is
 //! [`NoDescent`](Stopped::NoDescent). Iterations and time have limits.

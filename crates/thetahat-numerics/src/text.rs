@@ -15,7 +15,7 @@ const END: usize = 300;
 /// U+FFF9 to U+FFFB).
 ///
 /// ```
-/// use thetahat::text::is_invisible;
+/// use thetahat_numerics::text::is_invisible;
 ///
 /// assert!(['\x1b', '\u{9b}', '\n', '\u{200b}', '\u{202e}', '\u{2066}', '\u{feff}'].into_iter().all(is_invisible));
 /// assert!(!"Temp [°C] é µ 温度 ع 🌡".contains(is_invisible));
@@ -33,7 +33,7 @@ pub fn is_invisible(character: char) -> bool {
 /// A text with what is invisible ([`is_invisible`]) as an escape: harmless to a terminal, and on one line.
 ///
 /// ```
-/// assert_eq!(thetahat::text::harmless("u\x1b[2J\u{202e}x"), "u\\u{1b}[2J\\u{202e}x");
+/// assert_eq!(thetahat_numerics::text::harmless("u\x1b[2J\u{202e}x"), "u\\u{1b}[2J\\u{202e}x");
 /// ```
 pub fn harmless(text: &str) -> String {
     let mut harmless = String::with_capacity(text.len());
@@ -50,8 +50,8 @@ pub fn harmless(text: &str) -> String {
 /// A name as a message repeats it: [`harmless`], and cut off after this many characters.
 ///
 /// ```
-/// assert_eq!(thetahat::text::brief("heater", 40), "heater");
-/// assert_eq!(thetahat::text::brief("\x1bheater", 8), "\\u{1b}he…");
+/// assert_eq!(thetahat_numerics::text::brief("heater", 40), "heater");
+/// assert_eq!(thetahat_numerics::text::brief("\x1bheater", 8), "\\u{1b}he…");
 /// ```
 pub fn brief(name: &str, longest: usize) -> String {
     let cut = |text: &str| text.char_indices().nth(longest).map(|(end, _)| end);
@@ -70,7 +70,7 @@ pub fn brief(name: &str, longest: usize) -> String {
 ///
 /// ```
 /// let long = format!("unknown field `{}` at line 1 column 9", "x".repeat(50_000_000));
-/// let message = thetahat::text::message(&long);
+/// let message = thetahat_numerics::text::message(&long);
 /// assert!(message.chars().count() <= 1000);
 /// assert!(message.starts_with("unknown field `xxx") && message.ends_with("xxx` at line 1 column 9"));
 /// ```
@@ -97,7 +97,7 @@ pub fn message(text: &str) -> String {
 /// A text as a string of JSON, between quotes, with what is invisible as an escape.
 ///
 /// ```
-/// assert_eq!(thetahat::text::json("a\"\u{202e}\n"), r#""a\"\u202e\n""#);
+/// assert_eq!(thetahat_numerics::text::json("a\"\u{202e}\n"), r#""a\"\u202e\n""#);
 /// ```
 pub fn json(text: &str) -> String {
     escaped_json(serde_json::Value::from(text).to_string())

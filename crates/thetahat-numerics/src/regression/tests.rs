@@ -213,7 +213,7 @@ fn the_gram_matrix_of_long_signals_is_that_of_the_rows() {
 #[test]
 fn no_digits_are_lost_when_signals_grow() {
     let mut noise = Noise(3);
-    let signals = (0..2).map(|_| (0..900).map(|t| 1.05_f64.powi(t) * noise.next()).collect()).collect();
+    let signals = (0..2).map(|_| (0..900).map(|t| 1.05_f64.powi(t) * noise.uniform()).collect()).collect();
     for segments in [whole(900), vec![0..30, 30..55, 60..900]] {
         let case = Case {
             signals: Clone::clone(&signals),
@@ -251,25 +251,25 @@ fn hard_cases(residual: f64, noise: &mut Noise) -> Vec<Case> {
     };
     // Orthogonal regressors.
     let u = noise.take(length);
-    add(vec![output(&[], &u, || residual * noise.next()), u], taps(0, &[(2, 1)]));
+    add(vec![output(&[], &u, || residual * noise.uniform()), u], taps(0, &[(2, 1)]));
     // Two inputs that differ by little.
     for exponent in 0..11 {
         let u = noise.take(length);
-        let near = u.iter().map(|u| u + 0.1_f64.powi(exponent) * noise.next()).collect();
-        let y = output(&[0.5], &u, || residual * noise.next());
+        let near = u.iter().map(|u| u + 0.1_f64.powi(exponent) * noise.uniform()).collect();
+        let y = output(&[0.5], &u, || residual * noise.uniform());
         add(vec![y, u, near], taps(1, &[(2, 1), (1, 1)]));
     }
     // A smooth input and slow poles: sampled too fast.
     for order in 1..5 {
         let mut u = noise.take(length);
         (1..length).for_each(|t| u[t] += 0.999 * u[t - 1]);
-        add(vec![output(&vec![0.98; order], &u, || residual * noise.next()), u], taps(order, &[(2, 1)]));
+        add(vec![output(&vec![0.98; order], &u, || residual * noise.uniform()), u], taps(order, &[(2, 1)]));
     }
     // Offsets, in units small and large.
     for (exponent, unit) in (0..8).zip([1.0, 1e-30, 1e60].into_iter().cycle()) {
         let offset = 10_f64.powi(exponent);
         let u = noise.take(length);
-        let mut y = output(&[0.9, 0.3], &u, || residual * noise.next());
+        let mut y = output(&[0.9, 0.3], &u, || residual * noise.uniform());
         y.iter_mut().for_each(|y| *y = unit * (*y + offset));
         let u = u.iter().map(|u| u + offset).collect();
         add(vec![y, u], taps(2, &[(2, 1)]));
@@ -364,7 +364,7 @@ fn threads_do_not_change_a_bit() {
     let mut noise = Noise(7);
     let length = 150_000;
     let u = noise.take(length);
-    let y = output(&[0.9, 0.5], &u, || noise.next());
+    let y = output(&[0.9, 0.5], &u, || noise.uniform());
     let case = Case {
         signals: vec![y, u],
         taps: taps(2, &[(2, 1)]),
@@ -395,7 +395,7 @@ fn dependent_columns_are_named() {
     let mut noise = Noise(8);
     let length = 200;
     let (u, zero, one) = (noise.take(length), vec![0.0; length], vec![1.0; length]);
-    let y = output(&[0.5], &u, || noise.next());
+    let y = output(&[0.5], &u, || noise.uniform());
     let v = noise.take(length);
     let sum: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u - 3.0 * v).collect();
     let deficient = |signals: Vec<&Vec<f64>>, taps: Vec<Taps>| {

@@ -20,17 +20,17 @@ struct Plant {
 impl Plant {
     /// Poles inside a circle of radius 0.95.
     fn random(noise: &mut Noise) -> Self {
-        let mut below = |count: usize| ((noise.next() + 1.0) / 2.0 * count as f64) as usize;
+        let mut below = |count: usize| ((noise.uniform() + 1.0) / 2.0 * count as f64) as usize;
         let (na, inputs) = (below(5), 1 + below(2));
         let nb: Vec<usize> = (0..inputs).map(|_| 1 + below(4)).collect();
         let nk: Vec<usize> = (0..inputs).map(|_| below(4)).collect();
         let mut a = vec![1.0];
         while a.len() + 1 < na {
-            let (radius, angle) = (0.95 * noise.next().abs(), 3.0 * noise.next());
+            let (radius, angle) = (0.95 * noise.uniform().abs(), 3.0 * noise.uniform());
             a = product(&a, &[1.0, -2.0 * radius * angle.cos(), radius * radius]);
         }
         while a.len() < na + 1 {
-            a = product(&a, &[1.0, -0.95 * noise.next()]);
+            a = product(&a, &[1.0, -0.95 * noise.uniform()]);
         }
         let mut parameters = a.split_off(1);
         parameters.extend(noise.take(nb.iter().sum()));
@@ -155,7 +155,7 @@ fn units_of_any_size_scale_the_estimate_or_are_refused() {
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
     let u = noise.take(200);
     let mut y = vec![0.0];
-    (1..200).for_each(|t| y.push(0.8 * y[t - 1] + u[t - 1] + 0.1 * noise.next()));
+    (1..200).for_each(|t| y.push(0.8 * y[t - 1] + u[t - 1] + 0.1 * noise.uniform()));
     let unit = arx(&record(&y, &[&u], &whole(200)), &orders, Initial::Drop).unwrap();
     let mut refused = 0;
     let sizes = [1e-300, 1e-200, 1e-150, 1e-100, 1e-3, 1.0, 1e100, 1e150, 1e200, 1e300];

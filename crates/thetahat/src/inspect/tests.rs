@@ -18,7 +18,7 @@ mod pieces;
 /// This many normal numbers, to the eye: sums of twelve uniform ones.
 fn normal(seed: u64, count: usize) -> Vec<f64> {
     let mut noise = Noise(seed);
-    (0..count).map(|_| (0..12).map(|_| noise.next()).sum::<f64>() / 2.0).collect()
+    (0..count).map(|_| (0..12).map(|_| noise.uniform()).sum::<f64>() / 2.0).collect()
 }
 
 /// A y = x, from rest.
@@ -46,7 +46,7 @@ fn telegraph(seed: u64, count: usize, probability: f64) -> Vec<f64> {
     let mut value = 1.0;
     (0..count)
         .map(|_| {
-            if noise.next() < 2.0 * probability - 1.0 {
+            if noise.uniform() < 2.0 * probability - 1.0 {
                 value = -value;
             }
             value

@@ -195,7 +195,7 @@ fn missing_outputs_do_not_cut_an_output_error_model() {
     for _ in 0..40 {
         let (u, y) = first_order(500, &mut noise);
         whole.push(fitted(&log(&u, &y), &orders, "", Initial::Auto));
-        let y: Vec<f64> = y.iter().map(|y| if noise.next() < -0.4 { f64::NAN } else { *y }).collect();
+        let y: Vec<f64> = y.iter().map(|y| if noise.uniform() < -0.4 { f64::NAN } else { *y }).collect();
         let measured = y.iter().filter(|y| !y.is_nan()).count();
         let log = log(&u, &y);
         let report = fitted(&log, &orders, "", Initial::Auto);

@@ -221,7 +221,7 @@ fn an_estimated_start_is_the_best_there_is() {
     let mut noise = Noise(4);
     for model in models() {
         let u = signals(model.b.len(), 300, &mut noise);
-        let y: Vec<f64> = output(&model, &views(&u)).iter().map(|y| y + noise.next()).collect();
+        let y: Vec<f64> = output(&model, &views(&u)).iter().map(|y| y + noise.uniform()).collect();
         let record = Record {
             output: &y,
             inputs: views(&u),

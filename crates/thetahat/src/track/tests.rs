@@ -20,7 +20,7 @@ use crate::model::Orders;
 /// A log of y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u1(t-1) + 0.5 u1(t-2) - u2(t) + e(t) + c e(t-1), with e uniform in -size … size.
 pub(super) fn log(rows: usize, size: f64, c: f64, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {
     let mut noise = Noise(seed);
-    let inputs: Vec<[f64; 2]> = (0..rows).map(|_| [3.0 * noise.next(), noise.next()]).collect();
+    let inputs: Vec<[f64; 2]> = (0..rows).map(|_| [3.0 * noise.uniform(), noise.uniform()]).collect();
     let e: Vec<f64> = noise.take(rows).into_iter().map(|e| size * e).collect();
     let mut y = vec![0.0; rows];
     for t in 0..rows {

@@ -322,8 +322,8 @@ fn coloured_residuals_have_the_variance_of_their_colour() {
     let mut u = vec![0.0];
     let mut e = vec![0.0];
     for t in 1..samples {
-        u.push(0.7 * u[t - 1] + noise.next());
-        e.push(0.8 * e[t - 1] + noise.next());
+        u.push(0.7 * u[t - 1] + noise.uniform());
+        e.push(0.8 * e[t - 1] + noise.uniform());
     }
     let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
     let model = named(PolynomialModel::from_parameters(&orders, &[1.0, -0.5], None, 1.0, 1.0).unwrap());

@@ -36,7 +36,7 @@ fn pieces_in_any_order_add_up_to_the_whole() {
     let mut noise = Noise(15);
     let length = 30_000;
     let u = noise.take(length);
-    let y: Vec<f64> = output(&[0.98, 0.9], &u, || noise.next()).iter().map(|y| y + 1e6).collect();
+    let y: Vec<f64> = output(&[0.98, 0.9], &u, || noise.uniform()).iter().map(|y| y + 1e6).collect();
     let case = Case {
         signals: vec![y, u],
         taps: taps(3, &[(4, 2)]),
@@ -75,7 +75,7 @@ fn pieces_in_any_order_add_up_to_the_whole() {
 fn offsets_that_are_taken_later_are_taken_exactly() {
     let mut noise = Noise(16);
     let u = noise.take(2000);
-    let y = output(&[0.9], &u, || 0.1 * noise.next());
+    let y = output(&[0.9], &u, || 0.1 * noise.uniform());
     // Powers of two: what stands in the signals is exact.
     let (level, base) = (2_f64.powi(20), -2_f64.powi(22));
     let round = |x: &f64| (x * 2_f64.powi(25)).round() / 2_f64.powi(25);
@@ -128,7 +128,7 @@ fn what_is_stored_is_what_is_read() {
 fn what_the_rows_do_not_tell_is_named() {
     let mut noise = Noise(18);
     let (u, zero) = (noise.take(200), vec![0.0; 200]);
-    let y = output(&[0.5], &u, || noise.next());
+    let y = output(&[0.5], &u, || noise.uniform());
     let deficient = |signals: Vec<&Vec<f64>>| {
         let taps = taps(1, &[(2, 1), (1, 1)]);
         let case = Case {

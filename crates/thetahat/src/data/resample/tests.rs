@@ -84,7 +84,7 @@ fn nothing_reaches_across_a_gap_and_what_is_missing_has_no_weight() {
     let time = times(2000);
     let mut noise = Noise(3);
     let y: Vec<f64> = (0..2000)
-        .map(|k| if (496..505).contains(&k) || noise.next() > 0.8 { f64::NAN } else { 7.0 })
+        .map(|k| if (496..505).contains(&k) || noise.uniform() > 0.8 { f64::NAN } else { 7.0 })
         .collect();
     assert!(y.iter().filter(|value| value.is_nan()).count() > 150);
     let found = decimated(&time, y.clone());

@@ -20,7 +20,7 @@ fn data(length: usize, noise: &mut Noise, size: f64, error: fn(f64) -> f64) -> (
     for t in 0..length {
         let past = |values: &[f64], lag: usize| if t < lag { 0.0 } else { values[t - lag] };
         let driven = 0.8 * past(&u, 1) + 0.3 * past(&u, 2);
-        y.push(1.2 * past(&y, 1) - 0.5 * past(&y, 2) + driven + size * error(noise.next()));
+        y.push(1.2 * past(&y, 1) - 0.5 * past(&y, 2) + driven + size * error(noise.uniform()));
     }
     (y, u)
 }
@@ -70,14 +70,14 @@ fn fit(y: &[f64], u: &[f64], orders: &Orders, criterion: &ConvexFit) -> Result<C
 fn random_demands(noise: &mut Noise, orders: &Orders) -> ConvexFit {
     let mut criterion = ConvexFit::default();
     for parameter in orders.names() {
-        if noise.next() > 0.4 {
-            let low = noise.next();
-            criterion.bounds.push(Bound { parameter, low, high: low + noise.next().abs() });
+        if noise.uniform() > 0.4 {
+            let low = noise.uniform();
+            criterion.bounds.push(Bound { parameter, low, high: low + noise.uniform().abs() });
         }
     }
-    if orders.nb[0] > 0 && noise.next() > 0.4 {
-        let low = 2.0 * noise.next();
-        let high = if noise.next() > 0.0 { low } else { low + 1.0 };
+    if orders.nb[0] > 0 && noise.uniform() > 0.4 {
+        let low = 2.0 * noise.uniform();
+        let high = if noise.uniform() > 0.0 { low } else { low + 1.0 };
         criterion.dc_gain.push(GainBound { input: None, low, high });
     }
     criterion
@@ -112,8 +112,8 @@ fn sums_and_largest_errors_equal_those_of_linear_programs() {
             ..random_demands(&mut noise, &orders)
         };
         let segments =
-            if noise.next() > 0.0 { whole(length) } else { vec![0..length / 3, length / 3 + 1..length] };
-        let presample = if noise.next() > 0.0 { Presample::Drop } else { Presample::Zero };
+            if noise.uniform() > 0.0 { whole(length) } else { vec![0..length / 3, length / 3 + 1..length] };
+        let presample = if noise.uniform() > 0.0 { Presample::Drop } else { Presample::Zero };
         let record = record(&y, &[&u], &segments);
         let table = table(&record, &orders, presample);
         let mut reference = Reference::new(&vec![0.0; na + nb], &criterion, &orders);
@@ -212,7 +212,7 @@ fn the_box_of_two_parameters_is_that_of_the_vertices() {
         let size = [1.0, 1e-3, 1e-6, 1e-9][case % 4];
         let u = noise.take(25);
         let mut y = vec![0.0];
-        (1..25).for_each(|t| y.push(0.7 * y[t - 1] + 2.0 * u[t - 1] + size * noise.next()));
+        (1..25).for_each(|t| y.push(0.7 * y[t - 1] + 2.0 * u[t - 1] + size * noise.uniform()));
         let table = table(&record(&y, &[&u], &whole(25)), &orders(1, 1), Presample::Drop);
         let bound = size * (1.0 + case as f64 / 20.0);
         let criterion = ConvexFit { noise_bound: Some(bound), ..ConvexFit::default() };
@@ -408,9 +408,9 @@ fn no_small_change_is_better_with_a_ridge() {
             };
             let least = value(&found.parameters);
             for _ in 0..300 {
-                let step = 0.1_f64.powf(4.0 + 3.0 * noise.next());
+                let step = 0.1_f64.powf(4.0 + 3.0 * noise.uniform());
                 let other: Vec<f64> =
-                    found.parameters.iter().map(|value| value + step * noise.next()).collect();
+                    found.parameters.iter().map(|value| value + step * noise.uniform()).collect();
                 assert!(value(&other) > least * (1.0 - 1e-13), "{norm} {ridge} {step}");
             }
         }
@@ -553,7 +553,7 @@ fn standard_errors_of_the_sum_of_errors_are_those_of_many_trials() {
     for _ in 0..trials {
         let u = noise.take(150);
         let mut y = vec![0.0];
-        (1..150).for_each(|t| y.push(0.6 * y[t - 1] + u[t - 1] + wild(noise.next())));
+        (1..150).for_each(|t| y.push(0.6 * y[t - 1] + u[t - 1] + wild(noise.uniform())));
         let fitted = fit(&y, &u, &orders(1, 1), &criterion(Norm::One, &[], &[])).unwrap();
         for (index, row) in fitted.covariance.unwrap().iter().enumerate() {
             variance[index] += row[index] / f64::from(trials);

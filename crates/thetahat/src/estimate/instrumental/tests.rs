@@ -173,7 +173,7 @@ fn the_start_is_estimated_where_it_is_worth_it() {
     let mut noise = Noise(5);
     let u = noise.take(1500);
     let x = response(&[0.0, 0.02], &[1.0, -1.98, 0.9801], &u);
-    let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.next()).collect();
+    let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.uniform()).collect();
     let orders = Orders::oe(&[1], &[2], &[1]).unwrap();
     let fit = |from: usize| {
         let record = Record::new(&y[from..], vec![&u[from..]]).unwrap();

@@ -143,7 +143,7 @@ fn initial_conditions_are_estimated_where_they_are_worth_it() {
     let u = noise.take(1500);
     // Slow, so that the start is seen for long.
     let x = filtered(&[0.0, 0.02], &[1.0, -1.98, 0.9801], &u);
-    let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.next()).collect();
+    let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.uniform()).collect();
     let orders = Orders::oe(&[1], &[2], &[1]).unwrap();
     let fit = |from: usize, initial| {
         let record = Record::new(&y[from..], vec![&u[from..]]).unwrap();

@@ -9,18 +9,18 @@ use crate::model::polynomial::product;
 fn stable(order: usize, noise: &mut Noise) -> Vec<f64> {
     let mut monic = vec![1.0];
     while monic.len() + 1 < order + 1 {
-        let (radius, angle) = (0.95 * noise.next().abs(), 3.0 * noise.next());
+        let (radius, angle) = (0.95 * noise.uniform().abs(), 3.0 * noise.uniform());
         monic = product(&monic, &[1.0, -2.0 * radius * angle.cos(), radius * radius]);
     }
     while monic.len() < order + 1 {
-        monic = product(&monic, &[1.0, 0.9 * noise.next()]);
+        monic = product(&monic, &[1.0, 0.9 * noise.uniform()]);
     }
     monic
 }
 
 /// Random orders with one to two inputs or none, and parameters.
 fn random(noise: &mut Noise) -> (Orders, Vec<f64>) {
-    let mut below = |count: usize| ((noise.next() + 1.0) / 2.0 * count as f64) as usize;
+    let mut below = |count: usize| ((noise.uniform() + 1.0) / 2.0 * count as f64) as usize;
     let inputs = below(3);
     let (na, nc, nd) = (below(3), below(3), below(3));
     let nb: Vec<usize> = (0..inputs).map(|_| 1 + below(3)).collect();
@@ -261,7 +261,7 @@ fn taking_out_the_free_responses_leaves_the_normal_equations_of_their_best_weigh
     for _ in 0..20 {
         predictor.keep_free();
         let section = &mut predictor.sections[1];
-        section.trial.iter_mut().for_each(|weight| *weight += 0.1 * noise.next());
+        section.trial.iter_mut().for_each(|weight| *weight += 0.1 * noise.uniform());
         assert!(predictor.evaluate(&parameters).unwrap() > best);
     }
 }

@@ -128,7 +128,7 @@ fn transfer_functions_are_found_on_any_clock() -> Result<(), Error> {
     let input: Vec<f64> = (0..600)
         .map(|k| {
             if k % 9 == 0 {
-                level = noise.next();
+                level = noise.uniform();
             }
             level
         })

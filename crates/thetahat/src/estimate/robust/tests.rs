@@ -50,7 +50,7 @@ const ONE: &[f64] = &[1.0];
 fn wild(noise: &mut Noise, count: usize, part: f64) -> Vec<f64> {
     (0..count)
         .map(|_| {
-            let size = if noise.next() < 2.0 * part - 1.0 { 20.0 } else { 0.2 };
+            let size = if noise.uniform() < 2.0 * part - 1.0 { 20.0 } else { 0.2 };
             size * noise.normal()
         })
         .collect()

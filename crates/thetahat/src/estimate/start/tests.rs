@@ -20,7 +20,7 @@ use crate::model::{
 
 /// Nearly normal, of unit variance.
 fn normal(noise: &mut Noise, count: usize) -> Vec<f64> {
-    (0..count).map(|_| (0..12).map(|_| noise.next()).sum::<f64>() / 2.0).collect()
+    (0..count).map(|_| (0..12).map(|_| noise.uniform()).sum::<f64>() / 2.0).collect()
 }
 
 /// x = (B/F) u from rest, B written with its delay.
@@ -44,7 +44,7 @@ fn modal_plant(angles: &[f64], radius: f64, noise: &mut Noise) -> (Vec<f64>, Vec
     let f = modes.iter().fold(vec![1.0], |f, mode| product(&f, mode));
     let mut b = vec![0.0; f.len()];
     for (k, own) in modes.iter().enumerate() {
-        let phase = 3.0 * noise.next();
+        let phase = 3.0 * noise.uniform();
         let numerator = [0.0, phase.cos(), 0.9 * phase.sin()];
         let size = sum_of_squares(&response(&numerator, own, &{
             let mut pulse = vec![0.0; 3000];
@@ -206,9 +206,9 @@ fn starts_are_as_good_as_what_made_the_data() {
 fn random_monic(order: usize, radius: f64, noise: &mut Noise) -> Vec<f64> {
     let mut monic = vec![1.0];
     while monic.len() < order {
-        monic = product(&monic, &mode(radius * noise.next().abs(), 3.0 * noise.next()));
+        monic = product(&monic, &mode(radius * noise.uniform().abs(), 3.0 * noise.uniform()));
     }
-    if monic.len() == order { product(&monic, &[1.0, -radius * noise.next()]) } else { monic }
+    if monic.len() == order { product(&monic, &[1.0, -radius * noise.uniform()]) } else { monic }
 }
 
 /// What made some data.

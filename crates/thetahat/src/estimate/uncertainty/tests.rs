@@ -41,7 +41,7 @@ fn products_of_backward_filtered_columns_are_those_of_the_matrix() {
         Taps { signal: 2, first: 0, count: 3, sign: 1.0 },
         Taps { signal: 1, first: 7, count: 1, sign: 1.0 },
     ];
-    let combination = DMatrix::from_fn(4, 6, |_, _| noise.next());
+    let combination = DMatrix::from_fn(4, 6, |_, _| noise.uniform());
     // Within a block, on its boundary, across, and shorter than any lag.
     for (segment, rows) in [
         (0..1300, 0..1300),

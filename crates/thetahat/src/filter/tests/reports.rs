@@ -128,7 +128,7 @@ fn predictions_through_missing_outputs_are_those_of_the_filter() -> Result<(), E
     let (mut u, mut y) = (Vec::new(), [Vec::new(), Vec::new()]);
     let mut x = [0.0, 0.0];
     for _ in 0..400 {
-        let (input, e) = (noise.next(), [noise.next(), noise.next()]);
+        let (input, e) = (noise.uniform(), [noise.uniform(), noise.uniform()]);
         u.push(input);
         for (y, (x, e)) in y.iter_mut().zip(x.iter().zip(e)) {
             y.push(x + e);
@@ -141,7 +141,7 @@ fn predictions_through_missing_outputs_are_those_of_the_filter() -> Result<(), E
     let plan = StateSpacePlan { orders: Some(2..=2), ..StateSpacePlan::new(&["u"], &["y1", "y2"]) };
     let report = fit_state_space(&log(&y)?, &[], &plan)?;
     for y in &mut y {
-        (1..400).filter(|_| noise.next() < -0.6).for_each(|row| y[row] = f64::NAN);
+        (1..400).filter(|_| noise.uniform() < -0.6).for_each(|row| y[row] = f64::NAN);
     }
     let applied = report.apply(&log(&y)?, &[], None, Horizon::Steps { steps: 1 }, InitialCondition::Zero)?;
 

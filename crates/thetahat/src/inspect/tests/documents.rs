@@ -60,7 +60,7 @@ fn an_irregular_clock_is_resampled() {
     let time: Vec<f64> = u
         .iter()
         .map(|_| {
-            now += 0.5 * (1.01 + 0.3 * noise.next());
+            now += 0.5 * (1.01 + 0.3 * noise.uniform());
             now
         })
         .collect();

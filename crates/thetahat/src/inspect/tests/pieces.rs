@@ -155,7 +155,7 @@ fn one_part_is_the_whole() {
     assert_eq!(whole, pieces);
     // An irregular clock, too: it is resampled.
     let mut noise = Noise(5);
-    let time: Vec<f64> = (0..3000).map(|row| f64::from(row) + 0.4 * noise.next()).collect();
+    let time: Vec<f64> = (0..3000).map(|row| f64::from(row) + 0.4 * noise.uniform()).collect();
     let [whole, pieces] = both(&channels, Some(&time), &plan(&["u1"], Some("y")), &[]);
     assert_eq!(whole, pieces);
     assert!(pieces.log.resampled.is_some());

@@ -94,10 +94,11 @@ fn clusters_are_as_close_as_rounding_lets_them_be() {
 fn every_polynomial_comes_to_an_end() {
     let mut noise = Noise(2);
     for _ in 0..300 {
-        let size = 2 + (5.0 * (noise.next() + 1.0)) as usize;
-        let wild: Vec<f64> = (0..size).map(|_| noise.next() * 10_f64.powf(307.0 * noise.next())).collect();
+        let size = 2 + (5.0 * (noise.uniform() + 1.0)) as usize;
+        let wild: Vec<f64> =
+            (0..size).map(|_| noise.uniform() * 10_f64.powf(307.0 * noise.uniform())).collect();
         assert!(roots(&wild).is_some(), "{wild:?}");
-        let whole: Vec<f64> = (0..size).map(|_| (3.0 * noise.next()).round()).collect();
+        let whole: Vec<f64> = (0..size).map(|_| (3.0 * noise.uniform()).round()).collect();
         assert!(roots(&whole).is_some(), "{whole:?}");
     }
     for edge in [[1.0, f64::MAX], [f64::MAX, 1.0], [1.0, 5e-324], [5e-324, 5e-324], [1e300, 1e-300]] {

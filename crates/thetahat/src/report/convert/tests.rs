@@ -12,11 +12,11 @@ fn log(step: usize) -> Result<Log, Error> {
     let (mut u, mut y, mut x, mut held) = (Vec::new(), Vec::new(), [0.0, 0.0], 0.0);
     for t in 0..10_000 {
         if t % 5 == 0 {
-            held = noise.next();
+            held = noise.uniform();
         }
         u.push(held);
-        y.push(3.0 + x[0] + 0.3 * noise.next());
-        x = [0.95 * x[0] + x[1] + 0.1 * noise.next(), 0.8 * x[1] + 0.2 * held];
+        y.push(3.0 + x[0] + 0.3 * noise.uniform());
+        x = [0.95 * x[0] + x[1] + 0.1 * noise.uniform(), 0.8 * x[1] + 0.2 * held];
     }
     let channel = |name: &str, values: &[f64]| {
         let values = values.iter().copied().step_by(step).collect();

@@ -215,7 +215,7 @@ fn documents_come_back_and_warnings_say_what_a_single_step_hides() {
     let u: Vec<f64> = (0..200).map(|k| f64::from(u8::from(k >= 20))).collect();
     let mut noise = Noise(5);
     let y: Vec<f64> =
-        response("p1d", &[2.0, 20.0, 3.3], &times, &u).iter().map(|y| y + 0.05 * noise.next()).collect();
+        response("p1d", &[2.0, 20.0, 3.3], &times, &u).iter().map(|y| y + 0.05 * noise.uniform()).collect();
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 1.0).unwrap();
     let report = fit(&log, &plan("p1d")).unwrap();
     assert!(report.warnings.iter().any(|word| word.contains("one step")), "{:?}", report.warnings);

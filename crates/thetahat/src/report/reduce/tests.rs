@@ -10,9 +10,9 @@ fn a_reduced_report_goes_on_as_others_do() {
     let mut noise = Noise(2);
     let (mut u, mut y) = (Vec::new(), vec![0.0, 0.0]);
     for t in 0..400 {
-        u.push(noise.next());
+        u.push(noise.uniform());
         if t > 1 {
-            y.push(1.3 * y[t - 1] - 0.4 * y[t - 2] + u[t - 1] + 0.1 * noise.next());
+            y.push(1.3 * y[t - 1] - 0.4 * y[t - 2] + u[t - 1] + 0.1 * noise.uniform());
         }
     }
     let channel = |name: &str, values| Channel { name: name.to_owned(), values };

@@ -12,8 +12,8 @@ fn log(rows: usize, noise: f64) -> Log {
     let mut x = [0.0, 0.0];
     let mut all: [Vec<f64>; 4] = Default::default();
     for _ in 0..rows {
-        let u = [random.next(), random.next()];
-        let e = [noise * random.next(), 0.5 * noise * random.next()];
+        let u = [random.uniform(), random.uniform()];
+        let e = [noise * random.uniform(), 0.5 * noise * random.uniform()];
         let y = [x[0] + e[0], 0.5 * x[0] + x[1] + e[1]];
         x = [
             0.7 * x[0] + 0.2 * x[1] + u[0] + 0.3 * e[0],
@@ -196,8 +196,8 @@ fn a_log_that_starts_at_rest_tells_where_outputs_stay() {
     for row in 0..600 {
         let input = if row < 60 { 0.0 } else { 1.0 + 0.2 * f64::from(row / 40 % 3) };
         u.push(input);
-        y1.push(20.0 + x[0] + 0.02 * random.next());
-        y2.push(-5.0 + x[0] + x[1] + 0.02 * random.next());
+        y1.push(20.0 + x[0] + 0.02 * random.uniform());
+        y2.push(-5.0 + x[0] + x[1] + 0.02 * random.uniform());
         x = [0.9 * x[0] + 0.1 * input, 0.8 * x[1] + 0.2 * x[0]];
     }
     let channel = |name: &str, values| Channel { name: name.to_owned(), values };
@@ -224,8 +224,8 @@ fn a_log_that_starts_at_rest_tells_where_outputs_stay() {
     let mut sum = 0.0;
     let (mut u, mut y) = (Vec::new(), Vec::new());
     for _ in 0..500 {
-        u.push(random.next());
-        y.push(sum + 0.01 * random.next());
+        u.push(random.uniform());
+        y.push(sum + 0.01 * random.uniform());
         sum += u[u.len() - 1];
     }
     let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();

@@ -32,7 +32,7 @@ fn of(model: &PolynomialModel, space: &StateSpace, delays: Vec<usize>) -> StateS
 /// Two inputs and the output of a model that noise drives.
 fn log(model: &PolynomialModel, rows: usize) -> Log {
     let mut noise = Noise(1);
-    let mut draw = |scale: f64| -> Vec<f64> { (0..rows).map(|_| scale * noise.next()).collect() };
+    let mut draw = |scale: f64| -> Vec<f64> { (0..rows).map(|_| scale * noise.uniform()).collect() };
     let (u1, u2, e) = (draw(1.0), draw(1.0), draw(0.5));
     let StateSpace { f, g, h, d, k, .. } = model.state_space();
     let mut state = DMatrix::from_element(f.nrows(), 1, 2.0);

@@ -84,7 +84,7 @@ fn a_forecast_is_the_mean_of_the_futures() {
         let (mut sums, mut squares) = ([0.0; 10], [0.0; 10]);
         let runs = 1000;
         for _ in 0..runs {
-            e[50..].iter_mut().for_each(|e| *e = 0.75_f64.sqrt() * noise.next());
+            e[50..].iter_mut().for_each(|e| *e = 0.75_f64.sqrt() * noise.uniform());
             let y = output(&model, &u, &e);
             for step in 0..10 {
                 let error = y[50 + step] - found.values[step];

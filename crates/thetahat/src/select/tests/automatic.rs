@@ -109,11 +109,11 @@ fn an_effect_at_once_that_may_be_feedback_is_said_to_be_one() {
         for t in 0..3000 {
             let at = |x: &[f64], lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
             let now =
-                1.5 * at(&x, 1) - 0.7 * at(&x, 2) + 0.2 * at(&u, 1) + 0.1 * at(&u, 2) + 0.1 * noise.next();
+                1.5 * at(&x, 1) - 0.7 * at(&x, 2) + 0.2 * at(&u, 1) + 0.1 * at(&u, 2) + 0.1 * noise.uniform();
             x.push(now);
             y.push(now);
             if t % held == 0 {
-                wanted = noise.next();
+                wanted = noise.uniform();
             }
             u.push(gain * (wanted - now));
         }

@@ -132,7 +132,7 @@ fn what_simulates_is_taken_where_the_plant_is_not_among_the_models() {
     let mut noise = Noise(17);
     let (mut u, e) = (vec![0.0; 900], noise.take(900));
     for t in 1..900 {
-        u[t] = if t % 30 == 0 { 2.0 * noise.next() } else { u[t - 1] };
+        u[t] = if t % 30 == 0 { 2.0 * noise.uniform() } else { u[t - 1] };
     }
     let bent: Vec<f64> = u.iter().map(|u| u + 0.5 * u * u).collect();
     let slow = [1.0, -1.93, 0.9312];

@@ -8,7 +8,7 @@ use super::*;
 
 /// Gaussian numbers (Box and Muller 1958).
 fn gaussian(noise: &mut Noise) -> f64 {
-    let (radius, angle) = ((noise.next() + 1.0) / 2.0, noise.next());
+    let (radius, angle) = ((noise.uniform() + 1.0) / 2.0, noise.uniform());
     (-2.0 * (1.0 - radius).ln()).sqrt() * (PI * angle).cos()
 }
 
@@ -98,7 +98,7 @@ fn alarms_of_a_filter(detector: &mut ChangeDetector<f64>, samples: usize, factor
         let factors = [1.0, factor, factor];
         let error = Vector3::from_fn(|row, _| (variances[row] * factors[row]).sqrt() * gaussian(&mut noise));
         let measured = (rows * state + error)
-            .map(|y| if (noise.next() + 1.0) * 500.0 < f64::from(missing) { f64::NAN } else { y });
+            .map(|y| if (noise.uniform() + 1.0) * 500.0 < f64::from(missing) { f64::NAN } else { y });
         let innovation = filter.correct(&sensors, &none, &measured).unwrap();
         alarms += f64::from(u8::from(detector.update_all(&innovation).is_some()));
         filter.predict(&motion, &none).unwrap();

@@ -16,11 +16,11 @@ fn rows(count: usize, size: f64) -> Rows {
         let u = |lag: usize| t.checked_sub(lag).map_or(0.0, |at| rows[at].1);
         let (first, second) = (y(1), y(2));
         let next = Vector2::new(
-            1.2 * first[0] - 0.5 * second[0] - 0.1 * first[1] + 0.4 * u(2) + size * noise.next(),
+            1.2 * first[0] - 0.5 * second[0] - 0.1 * first[1] + 0.4 * u(2) + size * noise.uniform(),
             0.2 * first[0] - 0.1 * second[0] + 0.9 * first[1] - 0.3 * second[1] - 0.2 * u(3)
-                + size * noise.next(),
+                + size * noise.uniform(),
         );
-        rows.push((next, 2.0 * noise.next()));
+        rows.push((next, 2.0 * noise.uniform()));
     }
     rows
 }

@@ -11,7 +11,7 @@ fn figures_are_what_they_say() {
     let mut noise = Noise(1);
     let u = noise.take(200);
     let mut y = vec![3.0];
-    (1..200).for_each(|t| y.push(0.7 * y[t - 1] + u[t - 1] + 0.2 * noise.next()));
+    (1..200).for_each(|t| y.push(0.7 * y[t - 1] + u[t - 1] + 0.2 * noise.uniform()));
     let mut record = Record::new(&y, vec![&u]).unwrap();
     let orders = Orders::arx(1, &[1], &[1]).unwrap();
     let estimate = arx(&record, &orders, Initial::Drop).unwrap();

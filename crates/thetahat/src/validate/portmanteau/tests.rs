@@ -12,7 +12,7 @@ fn white_errors_pass_as_often_as_they_should() {
     let mut noise = Noise(3);
     let mut rejected = 0;
     for _ in 0..400 {
-        let all: Vec<(f64, f64)> = (0..300).map(|_| (noise.next(), noise.next())).collect();
+        let all: Vec<(f64, f64)> = (0..300).map(|_| (noise.uniform(), noise.uniform())).collect();
         // Correlated in the same sample, and nowhere else.
         let first = innovations(all.iter().map(|(a, _)| 5.0 + a).collect());
         let second = innovations(all.iter().map(|(a, b)| a + 0.5 * b).collect());
@@ -26,8 +26,8 @@ fn white_errors_pass_as_often_as_they_should() {
 #[test]
 fn it_sees_what_one_output_knows_of_another() {
     let mut noise = Noise(4);
-    let all: Vec<f64> = (0..1001).map(|_| noise.next()).collect();
-    let second: Vec<f64> = (1..1001).map(|t| 0.3 * all[t - 1] + noise.next()).collect();
+    let all: Vec<f64> = (0..1001).map(|_| noise.uniform()).collect();
+    let second: Vec<f64> = (1..1001).map(|t| 0.3 * all[t - 1] + noise.uniform()).collect();
     let (first, second) = (innovations(all[1..].to_vec()), innovations(second));
     assert!(portmanteau(&[&first, &second], 10, 0).unwrap().p_value.unwrap() < 1e-6);
     // In numbers: of one lag with C_0 = I it is N^2/(N - 1) times the sum of the squares of C_1.
@@ -47,10 +47,10 @@ fn rows_count_in_which_all_outputs_do() {
         let mut counted: Vec<Range<usize>> = Vec::new();
         let mut all: [Vec<f64>; 2] = Default::default();
         for row in 0..400 {
-            let there = noise.next() > -0.6;
-            let first = noise.next();
+            let there = noise.uniform() > -0.6;
+            let first = noise.uniform();
             all[0].push(first);
-            all[1].push(if there { first + noise.next() } else { 0.0 });
+            all[1].push(if there { first + noise.uniform() } else { 0.0 });
             match counted.last_mut().filter(|last| there && last.end == row) {
                 Some(last) => last.end = row + 1,
                 None if there => counted.push(row..row + 1),

@@ -42,11 +42,11 @@ fn log(loss: f64) -> Recording {
     let (mut u, mut y) = (Vec::new(), Vec::new());
     for row in 0..300 {
         if row % 15 == 0 {
-            flow = noise.next();
+            flow = noise.uniform();
         }
         u.push(flow);
-        y.push(level + 0.05 * 3.0_f64.sqrt() * noise.next());
-        level += 0.8 * flow - loss * level + 0.01 * 3.0_f64.sqrt() * noise.next();
+        y.push(level + 0.05 * 3.0_f64.sqrt() * noise.uniform());
+        level += 0.8 * flow - loss * level + 0.01 * 3.0_f64.sqrt() * noise.uniform();
     }
     let channel = |name: &str, values| Channel { name: name.into(), values };
     Recording { channels: vec![channel("u", u), channel("y", y)], times: Times::Uniform(1.0) }
@@ -231,8 +231,8 @@ fn a_parameter_that_runs_away_is_undetermined() {
     let mut noise = Noise(5);
     let (mut x, mut u, mut y) = (0.0, Vec::new(), Vec::new());
     for _ in 0..200 {
-        u.push(noise.next());
-        y.push(x + 0.1 * noise.next());
+        u.push(noise.uniform());
+        y.push(x + 0.1 * noise.uniform());
         x = 0.5 * x - u[u.len() - 1];
     }
     let channel = |name: &str, values| Channel { name: name.into(), values };

@@ -113,7 +113,7 @@ fn holes(mut y: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let rows = y[0].len();
     let mut noise = Noise(9);
     for (output, part) in y.iter_mut().zip([-0.6, -0.7]) {
-        output.iter_mut().skip(1).filter(|_| noise.next() < part).for_each(|value| *value = NAN);
+        output.iter_mut().skip(1).filter(|_| noise.uniform() < part).for_each(|value| *value = NAN);
     }
     y.iter_mut().for_each(|y| y[100..110].fill(NAN));
     y[1][rows - 4..].fill(NAN);
@@ -246,7 +246,7 @@ fn errors_are_smaller_than_after_a_restart_and_as_large_as_they_should_be() -> R
     let [u, y] = signals(&space, rows, &root(&space));
     let mut noise = Noise(11);
     let mut missing = y.clone();
-    (0..rows).filter(|_| noise.next() < -0.6).for_each(|row| missing[1][row] = NAN);
+    (0..rows).filter(|_| noise.uniform() < -0.6).for_each(|row| missing[1][row] = NAN);
     let model = model(&space)?;
     let whole = log(&u, &missing)?;
     let own = StateSpaceOnLog::new(&model, &whole, &all(&whole)?, None)?;

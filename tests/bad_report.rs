@@ -52,6 +52,44 @@ fn a_truncated_report() {
 }
 
 #[test]
+fn a_parameter_twice_or_one_too_few_is_refused_by_every_verb() {
+    let folder = folder();
+    let whole: Value = serde_json::from_str(&folder.read("model.json")).expect("a report");
+    let parameters = whole["model"]["parameters"].as_array().expect("parameters").clone();
+    for changed in [parameters[1..].to_vec(), [&parameters[..1], &parameters].concat()] {
+        let mut report = whole.clone();
+        report["model"]["parameters"] = changed.into();
+        folder.write("changed.json", report.to_string());
+        for words in [
+            "predict changed.json log.csv",
+            "validate changed.json log.csv",
+            "compare changed.json log.csv",
+            "bode changed.json",
+            "step changed.json",
+            "control changed.json --poles 0.5,0.5",
+            "export changed.json --to c --what predictor",
+        ] {
+            let line = folder.refused(words, 3);
+            assert!(line.contains("model.parameters are not those of the orders"), "{words}: {line}");
+        }
+    }
+}
+
+#[test]
+fn numbers_near_the_end_of_the_range_end_a_response() {
+    let folder = Folder::with_log(plain_log());
+    folder.done("fit log.csv --model ss --order 2 --report model.json");
+    for matrix in ["k", "g"] {
+        let mut report: Value = serde_json::from_str(&folder.read("model.json")).expect("a report");
+        report["model"][matrix][0][0] = 1e308.into();
+        folder.write("large.json", report.to_string());
+        let run = folder.run("bode large.json");
+        let is_told = run.code == 2 && run.stderr.contains("its numbers are too large");
+        assert!(run.code == 0 || is_told, "{matrix}: {}", run.stderr);
+    }
+}
+
+#[test]
 fn another_major_schema() {
     for schema in ["thetahat.report/2", "thetahat.report/10", "thetahat.report/0", "another.report/1", ""] {
         let report = folder().read("model.json").replace("thetahat.report/1", schema);

@@ -182,6 +182,15 @@ fn irregular() -> (String, [[Vec<f64>; 2]; 2]) {
 }
 
 #[test]
+fn a_step_that_leaves_one_row_is_refused_however_long_it_is() {
+    let folder = Folder::with_log("t,u,y\n0,0,0\n1,1,1\n2,0,1\n3,1,2\n4,0,1\n5,1,1\n");
+    for step in ["6", "1e7", "1e300"] {
+        let line = folder.refused(&format!("fit log.csv --time t --na 1 --nb 1 --resample {step}:linear"), 2);
+        assert!(line.contains("leaves one row of a log of 5 s"), "{line}");
+    }
+}
+
+#[test]
 fn a_resampled_log_gives_the_fit_of_the_uniform_one() {
     let (log, uniform) = irregular();
     for (how, [u, y]) in ["hold", "linear"].into_iter().zip(uniform) {

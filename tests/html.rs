@@ -404,7 +404,7 @@ fn pages_do_without_what_is_missing() {
     // A pole on the unit circle, where the frequency response has none.
     polynomials(&mut report).a[1] = 1.0;
     let page = validation_page(&report, &poor, "");
-    assert!(page.contains("the model has a pole at"));
+    assert!(page.contains("the model has no finite response at"));
 
     // No signals, no models, no channels.
     let page = fit_page(&complete_report, &[], &[], "");

@@ -84,13 +84,14 @@ impl Resample {
         let nyquist = 0.5 / self.step;
         let width = PI * (STOP - PASS) / ratio;
         let half = ((ATTENUATION - 7.95) / (2.285 * width) / 2.0).ceil();
-        Ok(Some(AntiAlias { cutoff: 0.5 * (PASS + STOP) * nyquist, taps: 2 * half as usize + 1 }))
+        Ok(Some(AntiAlias { cutoff: 0.5 * (PASS + STOP) * nyquist, taps: (2.0 * half + 1.0) as usize }))
     }
 }
 
 impl AntiAlias {
-    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1.
-    fn weights(&self, recorded: f64) -> Vec<f64> {
+    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1: of a filter that is longer than a log of so many rows, what
+    /// they can meet.
+    fn weights(&self, recorded: f64, rows: usize) -> Vec<f64> {
         let half = (self.taps / 2) as f64;
         let beta = 0.1102 * (ATTENUATION - 8.7);
         let weight = |tap: usize| {
@@ -99,8 +100,9 @@ impl AntiAlias {
             let sinc = if m == 0.0 { 1.0 } else { angle.sin() / angle };
             sinc * bessel(beta * (1.0 - (m / (half + 1.0)).powi(2)).sqrt())
         };
-        let mut weights: Vec<f64> = (0..self.taps).map(weight).collect();
-        let sum: f64 = weights.iter().sum();
+        let sum: f64 = (0..self.taps).map(weight).sum();
+        let met = (self.taps / 2).min(rows);
+        let mut weights: Vec<f64> = (self.taps / 2 - met..self.taps / 2 + met + 1).map(weight).collect();
         weights.iter_mut().for_each(|weight| *weight /= sum);
         weights
     }
@@ -180,7 +182,7 @@ impl Log {
     ///
     /// # Errors
     /// As for [`Log::with_time`], but for uniformity; [`Error::Argument`] for a step that is not positive or
-    /// gives more than 10^8 rows.
+    /// gives more than 10^8 rows, or a single one.
     ///
     /// ```
     /// use thetahat::data::{Channel, Interpolation, Log, Resample};
@@ -216,6 +218,12 @@ impl Log {
                 format!("a step of {step} s would give {} rows; take a longer one", short(count)),
             ));
         }
+        if count < 2.0 && rows > 1 {
+            let whole = short(last - first);
+            let message =
+                format!("a step of {step} s leaves one row of a log of {whole} s; take a shorter one");
+            return Err(Error::argument("resample", message));
+        }
         let instants: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * step).collect();
         // The last sample at or before each instant.
         let places: Vec<usize> = instants
@@ -229,7 +237,7 @@ impl Log {
             .collect();
         let read = || instants.iter().copied().zip(places.iter().copied());
         let filter = how.filter_for(time)?;
-        let weights = filter.map(|filter| filter.weights(recorded));
+        let weights = filter.map(|filter| filter.weights(recorded, rows));
         let filtered = weights.as_ref().map(|weights| Filtered::new(&channels, time, recorded, weights));
         let values = |channel: &Channel| -> Vec<f64> {
             let own = &channel.values;

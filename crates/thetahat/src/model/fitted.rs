@@ -229,6 +229,9 @@ impl PolynomialModel {
         if !(self.noise_variance.is_finite() && self.noise_variance >= 0.0) {
             return wrong("noise_covariance is not a variance");
         }
+        if !self.parameters.iter().map(|parameter| &parameter.name).eq(&orders.names()) {
+            return wrong("parameters are not those of the orders");
+        }
         let count = orders.parameters();
         let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
         if !self.covariance.as_ref().is_none_or(square) {

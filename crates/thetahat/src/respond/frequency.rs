@@ -181,12 +181,13 @@ pub(super) fn check_frequencies(frequencies: &[f64], sample_time: f64) -> Result
     Ok(())
 }
 
-/// There is no response at the frequency of a pole.
+/// There is no response at the frequency of a pole, nor where numbers overflow.
 pub(super) fn has_pole(frequency: f64) -> Error {
-    Error::argument(
-        "frequencies",
-        format!("the model has a pole at {frequency} rad/s: it has no response there; leave it out"),
-    )
+    let message = format!(
+        "the model has no finite response at {frequency} rad/s: a pole lies there, or its numbers are too large; leave this \
+         frequency out, or scale the channels towards one"
+    );
+    Error::argument("frequencies", message)
 }
 
 /// `count` frequencies from `first` to `last`, each the same factor above the one before.

@@ -158,7 +158,8 @@ impl Channel {
                     self.h[state].abs() + others().map(|row| self.f[(row, state)].abs()).sum::<f64>();
                 let done =
                     self.g[state].abs() + others().map(|column| self.f[(state, column)].abs()).sum::<f64>();
-                if does == 0.0 || done == 0.0 {
+                // Near the end of the range a sum, or what is compared below, is infinite: no unit is better.
+                if does == 0.0 || done == 0.0 || !(2.0 * (does + done)).is_finite() {
                     continue;
                 }
                 let (before, mut unit) = (does + done, 1.0);

@@ -4,6 +4,7 @@ use std::fmt::{self, Display, Formatter, Write};
 
 use super::figure::{Chart, Drawn};
 use super::text;
+use crate::text::is_invisible;
 
 /// The charting library, plotly.js by its name: the bundle of lines, bars and their axes. See plotly/README.md.
 const LIBRARY: &str = include_str!("plotly/plotly-basic.min.js");
@@ -148,6 +149,9 @@ impl Display for Text<'_> {
             '>' => f.write_str("&gt;"),
             '"' => f.write_str("&quot;"),
             '\'' => f.write_str("&#39;"),
+            '\n' => f.write_char('\n'),
+            // What sets the direction of writing could make a name look like another.
+            other if is_invisible(other) => write!(f, "{}", other.escape_default()),
             other => f.write_char(other),
         })
     }
@@ -243,5 +247,6 @@ mod tests {
     #[test]
     fn text_is_no_markup() {
         assert_eq!(Text("<a href=\"'\">&").to_string(), "&lt;a href=&quot;&#39;&quot;&gt;&amp;");
+        assert_eq!(Text("a\u{202e}b\x1b[31m\nc").to_string(), "a\\u{202e}b\\u{1b}[31m\nc");
     }
 }

@@ -3,6 +3,7 @@
 use crate::data::Rows;
 use crate::figures::{number, three};
 use crate::model::{Quantity, Root};
+use crate::text::harmless;
 
 /// What stands where there is no figure.
 pub(super) const NONE: &str = "–";
@@ -59,7 +60,7 @@ fn cut(name: &str, longest: usize) -> String {
     if shown.len() < name.len() {
         shown.push('…');
     }
-    shown.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+    harmless(&shown).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// JSON that may stand inside a script element.

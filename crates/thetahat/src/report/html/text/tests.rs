@@ -4,6 +4,7 @@ use super::*;
 fn names_are_no_markup_in_charts() {
     assert_eq!(plain("<b>x</b> & \"'"), "&lt;b&gt;x&lt;/b&gt; &amp; \"'");
     assert_eq!(plain("🚀"), "🚀");
+    assert_eq!(plain("\u{202e}x"), "\\u{202e}x");
     assert_eq!(plain(&"ä".repeat(41)), format!("{}…", "ä".repeat(40)));
 }
 

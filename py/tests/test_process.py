@@ -162,7 +162,7 @@ def test_parts_of_numpy_are_there_before_threads_are() -> None:
         import thetahat as th
         log = th.Log([1.0, 3.0, 2.0, 4.0, 1.0], [0.0, 1.0, 0.0, 1.0, 0.0])
         loaded = set(sys.modules)
-        th.arx(log, 1, 1, constant=False)
+        th.arx(log, 1, 1)
         th.ExtendedKalmanFilter([0.0], [[1.0]])
         print(sorted(name for name in set(sys.modules) - loaded if name.startswith("numpy")))
         """

@@ -148,6 +148,7 @@ fn nonlinear_models_say_what_the_library_does() {
     }
 }
 
+/// Takes 10 s: six models in Rust and in C are compiled and run.
 #[test]
 fn models_in_equations_say_what_the_library_does() {
     let folder = Folder::with_log(include_str!("data/dc_motor.csv"));
@@ -342,6 +343,7 @@ fn nearest_neighbours_are_for_rust_alone() {
     assert!(folder.refused(&format!("{export} --to c"), 2).contains("nearest neighbours"));
 }
 
+/// Takes 17 s: four estimators in Rust and C, each built with the library that it steps.
 #[test]
 fn estimators_go_on_from_the_fit() {
     let folder = motor();

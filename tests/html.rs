@@ -179,6 +179,7 @@ fn a_fit_is_shown_with_its_names_as_they_are() {
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
+/// Takes 15 s: Chromium draws five pages and waits for their charts.
 #[test]
 fn other_pages_are_shown() {
     let Some(mut browser) = Browser::start("other_pages_are_shown") else { return };
@@ -228,6 +229,7 @@ fn other_pages_are_shown() {
     stands(&mut browser, "tbody th", INPUT);
 }
 
+/// Takes 15 s: Chromium draws the page at three widths, and prints it.
 #[test]
 fn a_page_fits_a_phone_the_dark_and_paper() {
     let Some(mut browser) = Browser::start("a_page_fits_a_phone_the_dark_and_paper") else { return };
@@ -269,6 +271,7 @@ fn a_page_fits_a_phone_the_dark_and_paper() {
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
+/// Takes 15 s: the fit of a million rows, which has to be that long to be slow if pages hold all samples.
 #[test]
 fn a_million_samples_open_at_once() {
     let Some(mut browser) = Browser::start("a_million_samples_open_at_once") else { return };

@@ -232,6 +232,7 @@ fn run(page: &Page) -> usize {
     compared
 }
 
+/// Takes 15 s: each command of each page runs, some compile what they export.
 #[test]
 fn pages_print_what_their_commands_print() {
     let compared: usize = pages().iter().map(run).sum();

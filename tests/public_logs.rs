@@ -58,6 +58,7 @@ fn reference(folder: &Folder, line: &str, inputs: bool) -> f64 {
     best.map_or(f64::NAN, |best| held_out_mse(&best))
 }
 
+/// Takes 80 s: a choice of a model, and up to forty fits to compare it with, on each of the logs.
 #[test]
 fn every_public_log_is_inspected_and_fitted() {
     let mut told = String::new();

@@ -22,6 +22,7 @@ fn of(rows: usize) -> String {
     csv(&[("u", &u), ("y", &y)])
 }
 
+/// Takes 15 s: a stream has more than one part only where it is long: 800,000 rows.
 #[test]
 fn a_stream_gives_the_model_of_the_whole() {
     let folder = Folder::with_log(long());
@@ -76,6 +77,7 @@ fn gaps_clocks_and_several_logs_are_what_they_are() {
     }
 }
 
+/// Takes 10 s: rows for several parts, read four times.
 #[test]
 fn states_are_of_one_pass_too() {
     let folder = Folder::with_log(long());
@@ -195,6 +197,7 @@ fn inspected(folder: &Folder, line: &str) -> Value {
     serde_json::from_str(&run.stdout).expect("the document is JSON")
 }
 
+/// Takes 12 s: rows for two parts.
 #[test]
 fn an_inspection_of_a_stream_tells_what_the_whole_tells() {
     // Two parts.

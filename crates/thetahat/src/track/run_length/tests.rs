@@ -147,3 +147,21 @@ fn an_interval_that_makes_no_sense_is_refused() {
     }
     assert!(change_detector(10.0, 1).is_ok() && change_detector(1e9, 1).is_ok());
 }
+
+#[test]
+fn toeplitz_systems_are_solved() {
+    let mut noise = Noise(3);
+    for rows in [1, 2, 7, 40] {
+        let mut entries: Vec<f64> = (0..2 * rows - 1).map(|_| noise.uniform() / rows as f64).collect();
+        entries[rows - 1] += 2.0;
+        let right: Vec<[f64; 3]> = (0..rows).map(|_| [1.0, noise.uniform(), noise.uniform()]).collect();
+        let found = toeplitz(&entries, &right);
+        for (row, right) in right.iter().enumerate() {
+            for (side, right) in right.iter().enumerate() {
+                let product: f64 =
+                    (0..rows).map(|column| entries[rows - 1 + column - row] * found[column][side]).sum();
+                assert!((product - right).abs() < 1e-13, "{rows} {row} {side}: {product} {right}");
+            }
+        }
+    }
+}

@@ -27,6 +27,8 @@ pub enum Kind {
     Usage,
     /// The log or the report does not hold what was asked of it.
     Data,
+    /// The log takes more memory than is free.
+    Memory,
     /// The data cannot determine the model.
     Undetermined,
     /// A file cannot be read or written, and what the system says of it.
@@ -43,12 +45,17 @@ impl Failure {
         self.kind
     }
 
+    /// Whether it was the machine's, not the log's: another time it may not be there.
+    pub(crate) fn may_pass(&self) -> bool {
+        matches!(self.kind, Kind::Memory | Kind::Io(_) | Kind::Interrupted | Kind::Closed)
+    }
+
     /// The exit code of a program that ends so.
     pub(crate) fn exit_code(&self) -> u8 {
         match self.kind {
             Kind::Closed => 0,
             Kind::Usage => 2,
-            Kind::Data => 3,
+            Kind::Data | Kind::Memory => 3,
             Kind::Undetermined => 4,
             Kind::Io(_) => 5,
             Kind::Unmet => 6,
@@ -160,6 +167,7 @@ impl From<thetahat_table::Error> for Failure {
         let kind = match error.kind() {
             thetahat_table::ErrorKind::Io => Kind::Io(io::ErrorKind::Other),
             thetahat_table::ErrorKind::Data => Kind::Data,
+            thetahat_table::ErrorKind::Memory => Kind::Memory,
         };
         Self::new(kind, error.to_string())
     }

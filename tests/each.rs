@@ -122,7 +122,7 @@ fn a_run_goes_on_where_it_was() {
     // All but what could not be read is known.
     let again = folder.done(line);
     assert!(
-        again.stdout.contains("4 of them without a failure; 14 as in an earlier run"),
+        again.stdout.contains("4 of them without a failure; 13 as in an earlier run"),
         "{}",
         again.stdout
     );
@@ -134,15 +134,51 @@ fn a_run_goes_on_where_it_was() {
     let cut = journal.trim_end().len() - 20;
     folder.write("out/journal.jsonl", &journal[..cut]);
     let again = folder.done(line);
-    assert!(again.stdout.contains("; 11 as in an earlier run"), "{}", again.stdout);
+    assert!(again.stdout.contains("; 10 as in an earlier run"), "{}", again.stdout);
     let changed = folder.read("fleet.csv");
     assert_ne!(changed, table);
     assert_eq!(changed.lines().skip(12).collect::<Vec<_>>(), table.lines().skip(12).collect::<Vec<_>>());
-    assert!(folder.done(line).stdout.contains("; 14 as in an earlier run"));
+    assert!(folder.done(line).stdout.contains("; 13 as in an earlier run"));
     // Other options are another run.
     let other = folder.done(&line.replace("--na 2", "--na 1"));
     assert!(!other.stdout.contains("earlier run"), "{}", other.stdout);
     assert!(folder.done(line).stdout.contains("without a failure\n"));
+}
+
+#[test]
+fn a_document_belongs_to_its_log_and_is_whole() {
+    let folder = plants(2);
+    for (name, plant) in [("a", 0), ("b", 1)] {
+        std::fs::create_dir(folder.path(name)).expect("a folder");
+        let log = folder.read(&format!("logs/plant{plant:02}.csv"));
+        folder.write(&format!("{name}/x.csv"), log);
+    }
+    let each = |words: &str| format!("fit --each {words} --na 1 --nb 1 --reports out --table");
+    folder.done(&format!("{} t.csv", each("a/x.csv")));
+    let (document, journal) = (folder.read("out/x.json"), folder.read("out/journal.jsonl"));
+    let refused = |line: &str, why: &str| {
+        let message = folder.refused(line, 2);
+        assert!(message.contains(why), "{line}: {message}");
+        assert_eq!(
+            (folder.read("out/x.json"), folder.read("out/journal.jsonl")),
+            (document.clone(), journal.clone())
+        );
+    };
+    refused(&format!("{} t.csv", each("b/x.csv")), "out/x.json is the document of a/x.csv");
+    refused(&format!("{} out/journal.jsonl", each("a/x.csv")), "would be replaced");
+    refused(&format!("{} out/x.json", each("a/x.csv")), "is the document of a/x.csv");
+    refused(&format!("{} out/x.json", each("logs/plant00.csv")), "would be replaced");
+    // What is no longer what was written is written anew.
+    for changed in ["", &document[..100]] {
+        folder.write("out/x.json", changed);
+        let run = folder.done(&format!("{} t.csv", each("a/x.csv")));
+        assert!(!run.stdout.contains("earlier run"), "{}", run.stdout);
+        assert_eq!(folder.read("out/x.json"), document);
+    }
+    assert!(folder.done(&format!("{} t.csv", each("a/x.csv"))).stdout.contains("1 as in an earlier run"));
+    // A log that is not there any more has no say.
+    std::fs::remove_file(folder.path("a/x.csv")).expect("it is there");
+    folder.done(&format!("{} t.csv", each("b/x.csv")));
 }
 
 #[test]

@@ -153,12 +153,15 @@ fn a_log_that_memory_does_not_hold_is_refused_with_the_number() {
     packed.write_all(b"u,y\n").unwrap();
     (0..300).for_each(|_| packed.write_all("1,2\n3,1\n".repeat(10_000).as_bytes()).unwrap());
     let folder = Folder::with_log(packed.finish().unwrap());
-    for (verb, more) in [("inspect", ""), ("fit", "--na 1 --nb 1 --report model.json")] {
-        let inner = folder.command(&format!("{verb} log.csv {more}"));
+    let limited = |line: &str| {
+        let inner = folder.command(line);
         let mut command = Command::new("sh");
         command.arg("-c").arg("ulimit -v 500000; exec \"$0\" \"$@\"").arg(inner.get_program());
         command.args(inner.get_args()).current_dir(folder.path("")).env("RAYON_NUM_THREADS", "2");
-        let run = Run::of(command);
+        Run::of(command)
+    };
+    for (verb, more) in [("inspect", ""), ("fit", "--na 1 --nb 1 --report model.json")] {
+        let run = limited(&format!("{verb} log.csv {more}"));
         assert_eq!(run.code, 3, "{}", run.stderr);
         let line = run.refusal();
         for part in ["log.csv:", "does not fit into memory", "MB at 64 bytes each", "are free", "columns"] {
@@ -166,4 +169,10 @@ fn a_log_that_memory_does_not_hold_is_refused_with_the_number() {
         }
         assert_eq!(folder.names(), ["log.csv"]);
     }
+    // Another time the memory may be there: such a failure is not kept.
+    let each = "fit --each log.csv --na 1 --nb 1 --constant no --table t.csv --reports out";
+    assert_eq!(limited(each).code, 3);
+    let done = folder.run(each);
+    assert!(!done.stdout.contains("earlier run"), "{}", done.stdout);
+    assert!(!folder.read("t.csv").contains("does not fit into memory"));
 }

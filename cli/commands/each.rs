@@ -20,6 +20,7 @@ pub use self::journal::Journal;
 use self::logs::Named;
 use crate::args::EachArguments;
 use crate::failure::{Failure, Kind};
+use crate::files::Files;
 use crate::interrupt;
 use crate::messages::tell;
 use crate::output;
@@ -80,6 +81,9 @@ pub(super) fn each(
     }
     let logs = logs::named(patterns, arguments.list.as_deref(), arguments.reports.is_some())?;
     let journal = arguments.reports.as_deref().map(|folder| Journal::open(folder, common)).transpose()?;
+    if let Some((folder, journal)) = arguments.reports.as_deref().zip(journal.as_ref()) {
+        check_documents(folder, journal, &logs, table)?;
+    }
     let run = Run {
         logs: &logs,
         folder: arguments.reports.as_deref(),
@@ -104,6 +108,42 @@ pub(super) fn each(
     write(table, &rows)?;
     let reused = journal.as_ref().map_or(0, Journal::reused);
     end(table, &rows, reused)
+}
+
+/// That no document of another log is replaced, nor the journal or a document by the table.
+fn check_documents(folder: &Path, journal: &Journal, logs: &[Named], table: &Path) -> Result<(), Failure> {
+    let documents = journal.documents();
+    let mut read: Vec<PathBuf> = documents.keys().map(|document| document.to_path_buf()).collect();
+    read.push(journal.path().to_owned());
+    for log in logs {
+        let report = folder.join(&log.report);
+        let other = documents.get(report.as_path()).filter(|other| is_another(Path::new(other), &log.path));
+        if let Some(other) = other.filter(|_| report.exists()) {
+            return Err(Failure::usage(format!(
+                "{} is the document of {other}, of an earlier run, and would be that of {}; name both logs in one run, or give \
+                 --reports another folder",
+                report.display(),
+                log.path.display()
+            )));
+        }
+        if report == table {
+            return Err(Failure::usage(format!(
+                "{} is the document of {}; give --table another name",
+                report.display(),
+                log.path.display()
+            )));
+        }
+        read.push(report);
+    }
+    Files { read, written: vec![table.to_owned()] }.check()
+}
+
+/// Whether these are two files; one that is not there any more is none.
+fn is_another(other: &Path, log: &Path) -> bool {
+    match (fs::canonicalize(other), fs::canonicalize(log)) {
+        (Ok(other), Ok(log)) => other != log,
+        _ => false,
+    }
 }
 
 /// A run over all logs.
@@ -176,6 +216,8 @@ impl<W: Fn(&Path) -> Result<Done, Failure> + Sync> Run<'_, W> {
         }
         let mut row = Row::default();
         row.text("log", &path);
+        // A failure of the machine is tried again by the next run.
+        let mut lasts = true;
         match (self.work)(&log.path) {
             Ok(Done { json, row: figures, warnings, unmet }) => {
                 row.count("exit_code", unmet.as_ref().map_or(0, |failure| failure.exit_code().into()));
@@ -198,11 +240,12 @@ impl<W: Fn(&Path) -> Result<Done, Failure> + Sync> Run<'_, W> {
                 return Err(failure);
             }
             Err(failure) => {
+                lasts = !failure.may_pass();
                 row.count("exit_code", failure.exit_code().into());
                 row.text("message", failure.message());
             }
         }
-        if let Some((journal, digest)) = self.journal.zip(digest) {
+        if let Some((journal, digest)) = self.journal.zip(digest).filter(|_| lasts) {
             journal.note(&digest, &row)?;
         }
         Ok(row)

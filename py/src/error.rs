@@ -3,7 +3,7 @@
 use std::io;
 
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyValueError};
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
 create_exception!(
@@ -58,6 +58,7 @@ pub(crate) fn program(py: Python<'_>, failure: &thetahat_cli::Failure) -> PyErr 
         thetahat_cli::Kind::Undetermined => undetermined(py, message, Vec::new()),
         thetahat_cli::Kind::Io(kind) => io::Error::new(kind, message).into(),
         thetahat_cli::Kind::Usage => usage(py, message),
+        thetahat_cli::Kind::Memory => PyMemoryError::new_err(message),
         _ => PyValueError::new_err(message),
     }
 }

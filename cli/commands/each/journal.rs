@@ -1,8 +1,8 @@
 //! What has been done with which log, so that a run goes on where another one was interrupted.
 //!
 //! A file of lines in the folder of documents, one for each log that is done: the digest of the log and of all that its row
-//! depends on, and the row. A line is written once its document is on the disk. A line that was cut, and one of another digest, is
-//! as if it were not there.
+//! depends on, that of its document, and the row. A line is written once its document is on the disk. A line that was cut, one of
+//! another digest, and one whose document is another by now, is as if it were not there.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -27,16 +27,28 @@ const PIECE: usize = 1 << 18;
 pub struct Journal {
     path: PathBuf,
     file: Mutex<File>,
-    /// The digests and rows of earlier runs, by log.
-    known: HashMap<String, (String, Row)>,
+    /// What earlier runs noted, by log.
+    known: HashMap<String, Line>,
     common: String,
     reused: AtomicUsize,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 struct Line {
     digest: String,
+    /// The digest of the document, where there is one.
+    #[serde(default)]
+    document: Option<String>,
     row: Row,
+}
+
+impl Line {
+    fn report(&self) -> Option<&Path> {
+        match self.row.get("report") {
+            Some(Cell::Text(report)) => Some(Path::new(report)),
+            _ => None,
+        }
+    }
 }
 
 impl Journal {
@@ -62,10 +74,10 @@ impl Journal {
         file.read_to_end(&mut bytes).map_err(failed)?;
         let mut known = HashMap::new();
         for line in bytes.split(|byte| *byte == b'\n') {
-            if let Ok(Line { digest, row }) = serde_json::from_slice(line)
-                && let Some(Cell::Text(log)) = row.get("log")
+            if let Ok(line) = serde_json::from_slice::<Line>(line)
+                && let Some(Cell::Text(log)) = line.row.get("log")
             {
-                known.insert(log.clone(), (digest, row));
+                known.insert(log.clone(), line);
             }
         }
         // What was cut is a line of its own.
@@ -79,32 +91,27 @@ impl Journal {
 
     /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read.
     pub fn digest(&self, log: &Path) -> Option<String> {
-        let mut hasher = XxHash3_128::new();
-        hasher.write(self.common.as_bytes());
-        hasher.write(&[0]);
-        let mut file = File::open(log).ok()?;
-        let mut piece = vec![0; PIECE];
-        loop {
-            match file.read(&mut piece) {
-                Ok(0) => return Some(format!("{:032x}", hasher.finish_128())),
-                Ok(count) => hasher.write(&piece[..count]),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(_) => return None,
-            }
-        }
+        digest(self.common.as_bytes(), log)
     }
 
-    /// What an earlier run found of a log, if nothing has changed since and its document is still there.
+    /// What an earlier run found of a log, if neither it nor its document has changed since.
     pub fn row(&self, log: &str, digest: &str) -> Option<Row> {
-        let (known, row) = self.known.get(log)?;
-        let is_there = match row.get("report") {
-            Some(Cell::Text(report)) => Path::new(report).is_file(),
-            _ => true,
-        };
-        (known == digest && is_there).then(|| {
+        let line = self.known.get(log)?;
+        let is_there = || line.report().is_none_or(|report| document(report) == line.document);
+        (line.digest == digest && is_there()).then(|| {
             self.reused.fetch_add(1, Ordering::Relaxed);
-            row.clone()
+            line.row.clone()
         })
+    }
+
+    /// The documents that earlier runs wrote, each with its log.
+    pub(super) fn documents(&self) -> HashMap<&Path, &str> {
+        self.known.iter().filter_map(|(log, line)| Some((line.report()?, log.as_str()))).collect()
+    }
+
+    /// The file itself.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Notes what was found of a log.
@@ -113,7 +120,8 @@ impl Journal {
     /// That it cannot be written.
     pub fn note(&self, digest: &str, row: &Row) -> Result<(), Failure> {
         let failed = |error: io::Error| Failure::io(&self.path, "cannot be written", &error);
-        let line = Line { digest: digest.to_owned(), row: row.clone() };
+        let mut line = Line { digest: digest.to_owned(), document: None, row: row.clone() };
+        line.document = line.report().and_then(document);
         let mut line = serde_json::to_vec(&line).map_err(|error| failed(error.into()))?;
         line.push(b'\n');
         self.file.lock().unwrap_or_else(PoisonError::into_inner).write_all(&line).map_err(failed)
@@ -122,5 +130,27 @@ impl Journal {
     /// How many rows were taken from earlier runs.
     pub(super) fn reused(&self) -> usize {
         self.reused.load(Ordering::Relaxed)
+    }
+}
+
+/// The digest of a document; none if it cannot be read.
+fn document(path: &Path) -> Option<String> {
+    digest(b"", path)
+}
+
+/// The digest of some bytes and of a file.
+fn digest(before: &[u8], path: &Path) -> Option<String> {
+    let mut hasher = XxHash3_128::new();
+    hasher.write(before);
+    hasher.write(&[0]);
+    let mut file = File::open(path).ok()?;
+    let mut piece = vec![0; PIECE];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Some(format!("{:032x}", hasher.finish_128())),
+            Ok(count) => hasher.write(&piece[..count]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(_) => return None,
+        }
     }
 }

@@ -371,9 +371,7 @@ impl Conversion {
 
     /// The error for a table that takes more memory than there is.
     fn too_large(&self, words: &str) -> Error {
-        self.columns.error(format!(
-            "the log does not fit into memory: {words}; name fewer columns, or cut it into several"
-        ))
+        Error::memory(&self.columns.file, None, words)
     }
 
     /// Reads all rows for who takes them, until nobody does.

@@ -12,6 +12,8 @@ pub enum ErrorKind {
     Io,
     /// The bytes were read, but they are not the table that was asked for.
     Data,
+    /// The table takes more memory than is free.
+    Memory,
 }
 
 /// A reading error: one line that names the file, the position and the remedy.
@@ -67,6 +69,13 @@ impl Error {
             position: position.into(),
             message: message.into(),
         }
+    }
+
+    /// A table that takes more memory than is free; `words` say how much that is.
+    pub(super) fn memory(file: &str, position: impl Into<Option<Position>>, words: &str) -> Self {
+        let message =
+            format!("the log does not fit into memory: {words}; name fewer columns, or cut it into several");
+        Self { kind: ErrorKind::Memory, ..Self::data(file, position, message) }
     }
 
     /// Whose fault it is.

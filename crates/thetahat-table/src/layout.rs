@@ -125,9 +125,7 @@ impl Layout {
 
     /// The error for a table that takes more memory than there is; it was read up to `line`.
     pub(super) fn too_large(&self, line: u64, words: &str) -> Error {
-        let message =
-            format!("the log does not fit into memory: {words}; name fewer columns, or cut it into several");
-        Error::data(&self.file, Position { line, column: 1 }, message)
+        Error::memory(&self.file, Position { line, column: 1 }, words)
     }
 
     /// The error for a text that ends on `line` without a row of data.

@@ -25,7 +25,7 @@ Item = Union[str, "os.PathLike[str]", Log, Any]
 
 _BETWEEN = " | "
 _NOTED = (0, 3, 4)
-"""The exit codes of what depends on the log alone: not on arguments, nor on whether a file can be read."""
+"""The exit codes of what depends on the log alone: not on arguments, nor on whether a file can be read. (Nor on the memory.)"""
 _ENDINGS = re.compile(r"(\.(gz|csv|tsv|txt|parquet|arrow|feather))+$", re.IGNORECASE)
 
 
@@ -56,7 +56,7 @@ class Work:
             if known is not None:
                 return known
             row, found = self._new(name, report, lambda: self._of_file(name, item, path))
-        if digest is not None and row["exit_code"] in _NOTED:
+        if digest is not None and row["exit_code"] in _NOTED and not isinstance(found, MemoryError):
             journal.note(digest, list(row.items()))
         return row, found
 
@@ -67,7 +67,7 @@ class Work:
                 found = self.fit(log(), **self.options)
                 text = found.to_json()
                 figures = _thetahat.row(text)
-            except (ValueError, OSError, _thetahat.EstimationError) as error:
+            except (ValueError, OSError, MemoryError, _thetahat.EstimationError) as error:
                 return _failed(name, error), error
         for figure, value in figures:
             while figure in row:

@@ -2,6 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 use std::ffi::OsString;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::super::stored;
@@ -79,12 +80,36 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>, Failure> {
             paths.push(path);
         }
     }
+    let others = not_text(text);
+    if !others.is_empty() {
+        paths.extend(others);
+        paths.sort_unstable();
+    }
     if paths.is_empty() {
         return Err(Failure::usage(format!(
             "{text}: no file matches this pattern; check it, and the folder"
         )));
     }
     Ok(paths)
+}
+
+/// The files that a pattern stands for whose names are not UTF-8, which the library leaves out: each such letter is one that `*` and
+/// `?` stand for.
+fn not_text(pattern: &str) -> Vec<PathBuf> {
+    let (folder, name) = pattern.rsplit_once('/').map_or((".", pattern), |(folder, name)| (folder, name));
+    let (Ok(folders), Ok(name)) =
+        (glob::glob(if folder.is_empty() { "/" } else { folder }), glob::Pattern::new(name))
+    else {
+        return Vec::new();
+    };
+    let entries = folders.filter_map(Result::ok).filter_map(|folder| fs::read_dir(folder).ok()).flatten();
+    let files = entries.filter_map(Result::ok).filter(|entry| {
+        let own = entry.file_name();
+        own.to_str().is_none() && name.matches(&own.to_string_lossy()) && !entry.path().is_dir()
+    });
+    let path =
+        |entry: fs::DirEntry| if pattern.contains('/') { entry.path() } else { entry.file_name().into() };
+    files.map(path).collect()
 }
 
 /// The log's name below the folder that all logs share, with the ending .json.
@@ -106,6 +131,23 @@ fn document(path: &Path, shared: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn names_that_are_not_text_are_taken() {
+        use std::os::unix::ffi::OsStringExt;
+
+        let folder = tempfile::tempdir().expect("a folder");
+        let own = folder.path().join(OsString::from_vec(b"M\xfcller.csv".to_vec()));
+        for path in [own.clone(), folder.path().join("Zeta.csv"), folder.path().join("Abel.csv")] {
+            fs::write(path, "u,y\n").expect("a file");
+        }
+        let found =
+            |name: &str| matching(&folder.path().join(name)).map(|paths| paths.len()).unwrap_or_default();
+        assert_eq!(matching(&folder.path().join("*.csv")).expect("logs")[1], own);
+        assert_eq!([found("*.csv"), found("M*.csv"), found("M?ller.csv"), found("[A-M]*")], [3, 1, 1, 2]);
+        assert_eq!(found("*.txt"), 0);
+    }
 
     #[test]
     fn documents_are_named_below_what_the_logs_share() {

@@ -4,7 +4,7 @@
 //! threads that only the parent has.
 
 use std::any::Any;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -45,6 +45,26 @@ struct Pools {
 thread_local! {
     /// How many threads the calls of this thread share with all others that want as many; 0: as many as there are cores.
     static THREADS: Cell<usize> = const { Cell::new(0) };
+    /// What ends the calls of this thread, which no signal reaches where it is not the main one.
+    static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Ends the long work of the threads that have it, see [`threads`], within some tens of milliseconds.
+#[pyclass(frozen, module = "thetahat._thetahat")]
+#[derive(Default)]
+struct Stop(Arc<AtomicBool>);
+
+#[pymethods]
+impl Stop {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Work that is under way, and any that begins later, ends with KeyboardInterrupt.
+    fn ask(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
 }
 
 /// Runs a stage of the library without the interpreter lock, see [`awaited`].
@@ -142,15 +162,19 @@ fn known() -> MutexGuard<'static, Pools> {
     known
 }
 
-/// Has the calls of this thread share this many threads with all others that want as many, and gives how many they did; 0: as many
-/// as there are cores.
+/// Has the calls of this thread share this many threads with all others that want as many, 0: as many as there are cores; and end
+/// when `stop` is asked. Gives what was before, to be given back.
 #[pyfunction]
-fn threads(count: usize) -> usize {
-    THREADS.replace(count)
+#[pyo3(signature = (count, stop))]
+fn threads(count: usize, stop: Option<&Bound<'_, Stop>>) -> (usize, Option<Stop>) {
+    (THREADS.replace(count), STOP.replace(stop.map(|stop| Arc::clone(&stop.get().0))).map(Stop))
 }
 
 /// What Python's handlers of the signals since the last time raise.
 fn signals() -> PyResult<()> {
+    if STOP.with_borrow(|stop| stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed))) {
+        return Err(PyKeyboardInterrupt::new_err(()));
+    }
     Python::try_attach(|py| py.check_signals()).unwrap_or_else(|| {
         rest();
         Ok(())
@@ -203,6 +227,7 @@ static ENDING: OnceLock<ThreadId> = OnceLock::new();
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     let _ = HERE.set(thread::current().id());
+    module.add_class::<Stop>()?;
     module.add_function(wrap_pyfunction!(threads, module)?)?;
     py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
     let os = py.import("os")?;

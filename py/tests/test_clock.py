@@ -334,3 +334,43 @@ def test_a_file_as_pandas_reads_it(tmp_path: Any) -> None:
 def test_the_report_names_the_clock() -> None:
     source = th.arx(log_of(frame(AUTUMN)), 1, 2).document["data"]["logs"][0]
     assert (source["time"], source["start"]) == ("when", "2026-10-24T22:00:00Z")
+
+
+@pytest.mark.parametrize(("unit", "second"), [("s", 1), ("ms", 1000), ("us", 10**6), ("ns", 10**9)])
+def test_numbers_since_1970_are_told_by_their_size(unit: str, second: int) -> None:
+    first = 1_700_000_000 * second
+    counted = first + np.arange(200) * (second // 100 or 1)
+    frame = pd.DataFrame({"when": counted, "u": np.arange(200.0), "y": np.arange(200.0)})
+    log = th.Log.from_dataframe(frame, inputs="u", output="y", time="when")
+    assert log.sample_time == (1.0 if unit == "s" else 0.01)
+    said = f"by column 'when', {unit} since 1970, from 2023-11-14T22:13:20+00:00"
+    assert said in repr(log)
+    # They go back as they came, and parts of them too.
+    assert (log[50:].to_pandas()["when"] == counted[50:]).all()
+    assert log.to_polars()["when"].to_list() == counted.tolist()
+    # An index of them is a clock as well, also as floats.
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        indexed = th.Log.from_dataframe(frame.set_index("when"), inputs="u", output="y")
+        assert indexed.sample_time == log.sample_time
+        # Of nanoseconds float64 has the last 256 only together.
+        floats = th.Log(frame["y"].to_numpy(), time=counted.astype(float))
+        assert floats.sample_time == pytest.approx(log.sample_time, rel=1e-4)
+    if unit in ("ms", "us"):
+        assert th.Log(np.arange(200.0), time=counted + 0.25).sample_time == pytest.approx(0.01)
+    with pytest.warns(UserWarning, match="column 'when' looks like a clock; time='when' would use it; 1 s is assumed"):
+        th.Log.from_dataframe(frame, inputs="u", output="y")
+
+
+def test_numbers_that_may_be_since_1970_warn() -> None:
+    # Microseconds since the start, half an hour later, at 1 kHz: as seconds since 1970 the rows were 1000 s apart.
+    counted = 1_500_000_000 + 1000 * np.arange(100)
+    with pytest.warns(UserWarning, match="time: numbers near 1.5e.09 with steps of 1000 may be s since 1970, with 1000 s"):
+        log = th.Log(np.arange(100.0), time=counted)
+    assert log.sample_time == 1000.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Days of a calendar; seconds with fractions; seconds since the start.
+        assert "s since 1970" in repr(th.Log(np.arange(100.0), time=1_500_000_000 + 86_400 * np.arange(100)))
+        assert th.Log(np.arange(100.0), time=1.5e9 + 0.25 * np.arange(100)).sample_time == 0.25
+        assert th.Log(np.arange(100.0), time=100 * np.arange(100)).sample_time == 100.0

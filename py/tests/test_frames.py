@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import thetahat as th
@@ -320,3 +321,46 @@ def test_record_batches_and_capsules_are_frames() -> None:
         th.Log.from_dataframe(OnlyCapsule(table["y"]), output="y")
     with pytest.raises(ValueError, match="two columns"):
         th.Log.from_dataframe(pa.RecordBatch.from_arrays([pa.array([1.0]), pa.array([2.0])], ["y", "y"]), output="y")
+
+
+def runs_of_pandas() -> pd.DataFrame:
+    index = pd.date_range("2026-01-01", periods=50, freq="min", name="time")
+    signals = pd.DataFrame({"u": np.arange(50.0), "y": np.arange(50.0) ** 2}, index)
+    return pd.concat({"b": signals, "a": 2 * signals}, names=["run"])
+
+
+@pytest.mark.parametrize("time", [None, "time"])
+def test_levels_of_an_index_are_experiments_and_a_clock(time: str | None) -> None:
+    frame = runs_of_pandas()
+    log = th.Log.from_dataframe(frame, inputs="u", output="y", time=time)
+    assert (log.experiments, log.sample_time) == ([range(50), range(50, 100)], 60.0)
+    assert (log.y == frame["y"]).all()
+    pd.testing.assert_frame_equal(log.to_pandas(), frame[["u", "y"]], check_freq=False)
+    # Rows of the runs by turns, and the levels the other way round.
+    mixed = frame.swaplevel().sort_index()
+    again = th.Log.from_dataframe(mixed, inputs="u", output="y", time=time)
+    assert again.experiments == log.experiments
+    assert (again.y == np.concatenate([log.y[50:], log.y[:50]])).all()
+    assert again.to_pandas().index.names == ["time", "run"]
+    part = again[40:60].to_pandas(twice=2 * again.y[40:60])
+    assert (part["twice"] == 2 * mixed.loc[part.index, "y"]).all()
+
+
+def test_a_clock_in_a_column_and_runs_in_the_index() -> None:
+    frame = runs_of_pandas().reset_index("time")
+    frame.index = pd.MultiIndex.from_product([["b", "a"], range(50)], names=["run", "row"])
+    log = th.Log.from_dataframe(frame, inputs="u", output="y", time="time")
+    assert (log.experiments, log.sample_time) == ([range(50), range(50, 100)], 60.0)
+    counted = th.Log.from_dataframe(frame, inputs="u", output="y", sample_time=2.0)
+    assert (counted.experiments, counted.sample_time) == ([range(50), range(50, 100)], 2.0)
+
+
+def test_levels_that_do_not_tell_runs_apart_are_refused() -> None:
+    frame = runs_of_pandas()
+    with pytest.raises(ValueError, match="the index has several levels; give the name of the level"):
+        th.Log.from_dataframe(frame, inputs="u", output="y", time=np.arange(100.0))
+    with pytest.raises(ValueError, match="y: its index has several levels; Log.from_dataframe makes an experiment"):
+        th.Log(frame["y"], frame["u"])
+    codes = frame.index.set_codes([-1, *frame.index.codes[0][1:]], level="run", verify_integrity=False)
+    with pytest.raises(ValueError, match="the level 'run' of its index is missing in row 1; it tells which run"):
+        th.Log.from_dataframe(frame.set_axis(codes), inputs="u", output="y")

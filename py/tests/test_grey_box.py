@@ -293,3 +293,19 @@ def test_the_documents_are_those_of_the_command_line(tmp_path: Path) -> None:
                 validation.fit()
         assert validation.fit(output=box.outputs[0]) > 50
         assert json.loads(model.to_json())["model"]["kind"] == "equations"
+
+
+def test_states_and_parameters_keep_the_order_in_which_they_were_given() -> None:
+    unknown = {"start": 1.0, "sd": 1.0, "unknown": True}
+    box = th.GreyBox.from_functions(
+        sample_time=1,
+        states={"slow": (0, 1), "fast": (0, 1)},
+        inputs={"v": "u"},
+        parameters={"tau": unknown, "gain": unknown},
+        next=lambda x, u, p, dt: {"slow": x.slow + (p.gain * u.v - x.slow) / p.tau, "fast": x.slow},
+        outputs=lambda x, u, p: {"y": x.fast},
+        measurement={"y": 0.1},
+    )
+    assert (box.states, box.unknown) == (["slow", "fast"], ["tau", "gain"])
+    again = th.GreyBox(box.to_dict())
+    assert (again.states, again.unknown) == (box.states, box.unknown)

@@ -155,6 +155,41 @@ def test_ctrl_c_ends_what_takes_long(before: str, function: str, arguments: str)
     assert done.stdout == "interrupted 0\n", done.stderr
 
 
+@pytest.mark.skipif(not hasattr(os, "kill"), reason="this system has no signals")
+def test_ctrl_c_ends_many_fits_without_waiting_for_any() -> None:
+    code = """
+        import os, signal, threading
+        import numpy as np
+        import thetahat as th
+
+        random = np.random.default_rng(0)
+        u = random.standard_normal(60_000)
+        y = np.cumsum(random.standard_normal(len(u))) * 0.01 + np.convolve(u, np.exp(-np.arange(50) / 9))[: len(u)]
+        logs = {str(place): th.Log(y, u) for place in range(8)}
+        begun, ended = threading.Event(), []
+
+        def long(log):
+            begun.set()
+            found = th.search(log)
+            ended.append(found)
+            return found
+
+        def press():
+            begun.wait()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        threading.Thread(target=press).start()
+        try:
+            th.fit_many(logs, long)
+        except KeyboardInterrupt:
+            print("interrupted", len(ended))
+        # What comes next is not ended.
+        print(th.fit_many(logs, th.arx, na=1, nb=1))
+        """
+    done = python(code)
+    assert done.stdout == "interrupted 0\nFits(8 logs, 8 of them without a failure)\n", done.stderr
+
+
 def test_parts_of_numpy_are_there_before_threads_are() -> None:
     # NumPy loads some at their first use: of several threads that meet there, one may recurse without end.
     code = """

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pandas as pd
 from numpy.typing import NDArray
 
 pytest.importorskip("sklearn", minversion="1.6")
@@ -23,6 +24,7 @@ from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 import thetahat
+import thetahat as th
 from thetahat.sklearn import EXPECTED_FAILED_CHECKS, ARXRegressor, NARXRegressor, StateSpaceRegressor
 
 # a1, a2, then b1 and b2 of the first input, b2 and b3 of the second.
@@ -398,3 +400,40 @@ def test_states_are_chosen_and_their_names_avoid_those_of_inputs() -> None:
     assert series.predict(None, y).shape == y.shape
     with pytest.raises(NotFittedError):
         StateSpaceRegressor().predict(u)
+
+
+def frame_with_gap() -> tuple[pd.DataFrame, pd.Series[float]]:
+    log = th.dc_motor()
+    index = pd.date_range("2026", periods=1500, freq="10s").delete(range(500, 1000))
+    return pd.DataFrame({"u": log["u"]}, index), pd.Series(log["y"], index, name="y")
+
+
+def test_an_index_of_times_is_the_clock() -> None:
+    X, y = frame_with_gap()
+    fitted = ARXRegressor(na=2, nb=2).fit(X, y)
+    expected = th.arx(th.Log.from_dataframe(X.assign(y=y), inputs="u", output="y"), na=2, nb=2)
+    assert (fitted.model_.sample_time, fitted.model_.samples) == (10.0, expected.samples)
+    assert (fitted.coef_ == expected.parameters).all()
+    # Each side of the gap begins at rest.
+    free = fitted.predict(X)
+    assert (free[500:] == expected.simulate(X["u"][500:], initial="zero")).all()
+    ahead = fitted.set_params(horizon=3).predict(X, y)
+    assert np.isnan(ahead[500]) and not np.isnan(ahead[510])
+    with pytest.raises(ValueError, match="its rows are 20 s apart, those of the fit 10 s"):
+        fitted.set_params(horizon=None).predict(X[:500:2])
+    with pytest.raises(ValueError, match="sample_time: the index is a clock"):
+        ARXRegressor(na=2, nb=2, sample_time=10.0).fit(X, y)
+
+
+def test_rows_out_of_order_are_refused_and_holes_are_gaps() -> None:
+    X, y = frame_with_gap()
+    shuffled = np.random.default_rng(0).permutation(len(X))
+    with pytest.raises(ValueError, match="time goes back"):
+        ARXRegressor(na=2, nb=2).fit(X.iloc[shuffled], y.iloc[shuffled])
+    counted = X.reset_index(drop=True), y.reset_index(drop=True)
+    with pytest.raises(ValueError, match="X: its index goes back from .*shuffled folds do not"):
+        ARXRegressor(na=2, nb=2).fit(counted[0].iloc[shuffled], counted[1].iloc[shuffled])
+    holes = np.r_[0:300, 600:1000]
+    fitted = ARXRegressor(na=2, nb=2, sample_time=0.1).fit(counted[0].iloc[holes], counted[1].iloc[holes])
+    assert fitted.model_.sample_time == pytest.approx(0.1)
+    assert fitted.model_.samples == len(holes) - 2 * 2

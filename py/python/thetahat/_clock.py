@@ -26,6 +26,12 @@ SECOND = np.timedelta64(1, "s")
 UNIFORM = 0.1
 # How many of the last rows tell the calendar that they follow.
 LAST = 1000
+# Units of time since 1970, each with how many of it are a second.
+EPOCHS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+# The instants of logs: from 2000 to 2100, in seconds since 1970.
+LOGGED = (9.4e8, 4.1e9)
+# Steps of a calendar are whole minutes; others are shorter than this many seconds.
+SLOW = 100.0
 
 ISO_8601 = re.compile(
     r"(\d{4}-\d\d-\d\d)(?:[T ](\d\d:\d\d(?::\d\d(?:[.,]\d{1,9})?)?))? ?(Z|[+-]\d\d(?::?\d\d)?)?", re.ASCII | re.IGNORECASE
@@ -42,6 +48,8 @@ class Labels(NamedTuple):
     """A tzinfo or the name of a time zone; None for all but instants with one."""
     rule: Any = None
     """The rule that an index of pandas follows, its `freq`."""
+    epoch: str | None = None
+    """The unit of the numbers since 1970 that the times were given as."""
 
     @property
     def are_times(self) -> bool:
@@ -102,6 +110,10 @@ class Labels(NamedTuple):
 
     def to_pandas(self) -> Any:
         """As an index."""
+        if isinstance(self.name, tuple):
+            return _imported("pandas").MultiIndex.from_tuples(self.values, names=self.name)
+        if self._is_counted:
+            return _imported("pandas").Index(self.values.astype(np.int64), name=self.name)
         index = _imported("pandas").Index(self.values, name=self.name)
         if self.zone is not None:
             index = index.tz_localize("UTC").tz_convert(self.zone)
@@ -113,6 +125,8 @@ class Labels(NamedTuple):
         """As a series."""
         polars = _imported("polars")
         values, name = self.values, "time" if self.name is None else str(self.name)
+        if self._is_counted:
+            return polars.Series(name, self.values.astype(np.int64))
         if self.are_times and np.datetime_data(values.dtype)[0] not in ("ms", "us", "ns"):
             values = values.astype(f"{values.dtype.kind}8[us]")
         series = polars.Series(name, values)
@@ -122,6 +136,38 @@ class Labels(NamedTuple):
             if known != "UTC" and "/" in known:
                 series = series.dt.convert_time_zone(known)
         return series
+
+    @property
+    def _is_counted(self) -> bool:
+        """Whether the instants go back to numbers since 1970; finer ones than were given stay instants."""
+        return self.epoch is not None and self.values.dtype == np.dtype(f"datetime64[{self.epoch}]")
+
+    def dated(self, argument: str) -> Labels:
+        """Numbers that can only be a time since 1970, in a unit that their size tells, as the instants that they are."""
+        numbers = self.values
+        if numbers.dtype.kind not in "iuf" or len(numbers) < 2 or not np.isfinite(numbers).all():
+            return self
+        low, high = float(numbers.min()), float(numbers.max())
+        step = float(np.median(np.diff(numbers.astype(np.float64))))
+        inside = [unit for unit, second in EPOCHS.items() if LOGGED[0] * second <= low and high <= LOGGED[1] * second]
+        whole = numbers.dtype.kind in "iu" or bool((numbers == np.floor(numbers)).all())
+        # A fraction of a second is more than instants have digits for.
+        if not inside or step <= 0 or not (whole or inside[0] != "s"):
+            return self
+        unit, lasts = inside[0], step / EPOCHS[inside[0]]
+        if lasts >= SLOW and lasts % 60 != 0:
+            _said.warn(
+                f"{argument}: numbers near {low:.3g} with steps of {step:g} may be {unit} since 1970, with {lasts:g} s from row to "
+                "row; they are taken as seconds; give times (pandas.to_datetime with its unit), or seconds",
+                stacklevel=4,
+            )
+            return self
+        instants = np.floor(numbers).astype(np.int64)
+        if not whole:
+            fine = 1e9 / EPOCHS[unit]
+            instants = instants * int(fine) + np.round((numbers - np.floor(numbers)) * fine).astype(np.int64)
+        values = instants.astype(f"datetime64[{unit if whole else 'ns'}]")
+        return self._replace(values=values, zone=datetime.timezone.utc, epoch=unit if whole else None)
 
     def after(self, steps: int, sample_time: float) -> Labels | None:
         """Those of the rows to come; None where nothing says what follows."""
@@ -155,7 +201,7 @@ class Labels(NamedTuple):
             # Days of work, and others that leave some out: the steps of the log do not.
             return None
         rule = self.rule
-        index = self._replace(values=self.values[-LAST:], rule=None).to_pandas()
+        index = self._replace(values=self.values[-LAST:], rule=None, epoch=None).to_pandas()
         if rule is None and not (last == last[0]).all():
             with warnings.catch_warnings():
                 # pandas 3.1 announces that another type will be returned, which date_range takes as well.
@@ -210,8 +256,10 @@ class Clock(NamedTuple):
 
     def text(self) -> str:
         """What the repr of a log says after the sample time."""
-        start = "" if self.times is None or not self.times.are_times else f" from {self.times.text()}"
-        return (f" {self.said}" if self.said else "") + start
+        if self.times is None or not self.times.are_times:
+            return f" {self.said}" if self.said else ""
+        unit = f", {self.times.epoch} since 1970," if self.times.epoch is not None else ""
+        return (f" {self.said}" if self.said else "") + f"{unit} from {self.times.text()}"
 
 
 def joined(clocks: Sequence[Clock]) -> Clock:
@@ -228,7 +276,8 @@ def _joined(labels: Sequence[Labels | None]) -> Labels | None:
         return None
     zones = [one.zone for one in there]
     zone = zones[0] if all(str(zone) == str(zones[0]) for zone in zones) else datetime.timezone.utc
-    return Labels(np.concatenate([one.values for one in there]), there[0].name, zone)
+    epoch = there[0].epoch if len({one.epoch for one in there}) == 1 else None
+    return Labels(np.concatenate([one.values for one in there]), there[0].name, zone, None, epoch)
 
 
 def to_pandas(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) -> Any:
@@ -306,7 +355,7 @@ def read(argument: str, values: Any, name: Any = None) -> Labels:
             return Labels(found.copy(), name)
         if found.dtype.kind in "USO":
             return _of_objects(argument, found.tolist(), name)
-        return Labels(_numbers.column(argument, values).copy(), name)
+        return _numbered(argument, found, _numbers.column(argument, values).copy(), name)
     name = native.name if name is None and native.name else name
     if native.dtype == nw.Duration:
         return Labels(np.array(native.to_numpy()), name, None, rule)
@@ -319,8 +368,15 @@ def read(argument: str, values: Any, name: Any = None) -> Labels:
         # With a time zone these are in UTC.
         return Labels(np.array(native.to_numpy()), name, zone, rule)
     if native.dtype.is_numeric():
-        return Labels(_numbers.series(argument, native).copy(), name)
+        return _numbered(argument, native.to_numpy(), _numbers.series(argument, native).copy(), name)
     return _of_objects(argument, native.to_list(), name)
+
+
+def _numbered(argument: str, given: Any, numbers: _numbers.Array, name: Any) -> Labels:
+    """Numbers: a time since 1970, of whose nanoseconds float64 would lose some, or seconds."""
+    exact = np.asarray(given)
+    dated = Labels(exact if exact.dtype.kind in "iu" else numbers, name).dated(argument)
+    return dated if dated.are_times else Labels(numbers, name)
 
 
 def _of_objects(argument: str, entries: list[Any], name: Any) -> Labels:
@@ -426,9 +482,10 @@ def common_index(rows: Sequence[tuple[str, Any]]) -> Any:
 
 
 def of_index(index: Any) -> Clock | None:
-    """The clock that an index of pandas is: instants, days, periods, durations, or texts of instants. Numbers are none."""
+    """The clock that an index of pandas is: instants, days, periods, durations, texts of instants, or numbers since 1970."""
     labels = labels_of(index)
     called = "the index" if labels.name is None else f"the index {labels.name!r}"
+    labels = labels.dated(called)
     if labels.are_times:
         return Clock(f"by {called}", labels)
     if labels.values.dtype.kind != "O" or not are_times(labels.values):
@@ -439,10 +496,19 @@ def of_index(index: Any) -> Clock | None:
 
 def labels_of(index: Any) -> Labels:
     """What an index of pandas holds, times as times."""
+    if index.nlevels > 1:
+        return Labels(_objects(index), tuple(index.names))
     kind = getattr(index.dtype, "kind", "O")
     if kind in "mM":
         return read("index", index)
     return Labels(np.asarray(index) if kind in "biuf" else np.asarray(index, dtype=object), index.name)
+
+
+def _objects(index: Any) -> NDArray[Any]:
+    """The tuples of an index with several levels, one in each row."""
+    values = np.empty(len(index), dtype=object)
+    values[:] = list(index)
+    return values
 
 
 def assumed(index: Any) -> Clock:

@@ -71,13 +71,53 @@ def clock(frame: Any, name: str) -> _clock.Clock:
     return _clock.Clock(f"by {said}", times, None if index is None else _clock.labels_of(index), column=True)
 
 
+def runs(frame: Any, time: str | None) -> list[tuple[Any, NDArray[np.intp]]]:
+    """The runs that the levels of an index of pandas tell apart, each as a frame with the level of its clock as index, and its
+    rows; none of a frame whose index has one level.
+
+    Parameters
+    ----------
+    frame : dataframe
+        Of any library.
+    time : str, optional
+        The level that is the clock. Without it that is the last one that holds times, or the last one.
+
+    Raises
+    ------
+    ValueError
+        If a row belongs to no run.
+    """
+    index = _clock.common_index([("frame", frame)])
+    if index is None or index.nlevels == 1:
+        return []
+    levels = range(index.nlevels)
+    if time in index.names:
+        clock = index.names.index(time)
+    else:
+        of_times = [level for level in levels if _clock.of_index(index.get_level_values(level)) is not None]
+        clock = of_times[-1] if of_times else levels[-1]
+    numbers = index.droplevel(clock).factorize()[0]
+    for level in levels:
+        missing = np.flatnonzero(index.get_level_values(level).isna())
+        if level != clock and len(missing):
+            called = f"the level {index.names[level]!r}" if index.names[level] is not None else f"level {level}"
+            message = f"frame: {called} of its index is missing in row {missing[0] + 1}; it tells which run a row belongs to"
+            raise ValueError(message)
+    order = np.argsort(numbers, kind="stable")
+    plain = frame.set_axis(index.get_level_values(clock))
+    parts = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+    return [(plain.iloc[rows], rows) for rows in parts]
+
+
 def clocks(frame: Any, but: Sequence[str]) -> list[str]:
-    """The columns that hold times or texts of instants, but for some."""
+    """The columns that hold times, texts of instants or numbers since 1970, but for some."""
     table = _table(frame)
 
     def is_clock(name: str) -> bool:
         dtype = table.schema[name]
         text = dtype == nw.String or dtype == nw.Object
+        if dtype.is_integer():
+            return _clock.Labels(np.asarray(table.get_column(name).to_numpy()), name).dated(f"column {name!r}").are_times
         return dtype.is_temporal() or (text and _clock.are_times(table.get_column(name).head(10).to_list()))
 
     return [name for name in table.columns if name not in but and is_clock(name)]

@@ -30,9 +30,9 @@ class Log:
         Time from one row to the next: seconds, or a timedelta of Python, NumPy or pandas. Without it and a clock it is assumed
         to be 1 s; the repr says so.
     time : array_like, shape (N,), optional
-        The clock instead: instants with or without a time zone, texts of them in ISO 8601, durations, or seconds. Steps may
-        differ from their median by 10 %; one longer than 1.5 medians is a gap. An index of pandas that all series share is the
-        clock if it holds times; one that counts rows is not.
+        The clock instead: instants with or without a time zone, texts of them in ISO 8601, durations, or seconds; numbers that can
+        only be s, ms, µs or ns since 1970, by their size, are these. Steps may differ from their median by 10 %; one longer than
+        1.5 medians is a gap. An index of pandas that all series share is the clock if it holds times; one that counts rows is not.
     resample : (float or timedelta, {"linear", "hold"}) or (…, "unfiltered"), optional
         Puts the log on another clock: time between the new rows, and how to read between the old ones. A step of two recorded
         ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
@@ -88,6 +88,8 @@ class Log:
             *(u.items() if isinstance(u, Mapping) else [("u", u)]),
         ]
         index = _clock.common_index(of_pandas if time is None else [*of_pandas, ("time", time)])
+        if index is not None and index.nlevels > 1:
+            raise ValueError("y: its index has several levels; Log.from_dataframe makes an experiment of each run that they tell apart")
         clock = None
         if time is not None:
             times = _clock.read("time", time)
@@ -117,7 +119,8 @@ class Log:
         Parameters
         ----------
         frame : data frame
-            Of pandas, Polars, PyArrow, or any library with their interchange protocols. Missing values become NaN.
+            Of pandas, Polars, PyArrow, or any library with their interchange protocols. Missing values become NaN. Where an index of
+            pandas has several levels, such as run and time, one is the clock, and each run of the others is an experiment.
         inputs : sequence of str, or str
             The columns that are inputs; none for a time series.
         output : str or sequence of str
@@ -155,6 +158,18 @@ class Log:
 
         names = [_options.text("inputs", name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
         outputs = names_of("output", output)
+        runs = _frames.runs(frame, time if isinstance(time, str) else None)
+        if runs:
+            if time is not None and not isinstance(time, str):
+                raise ValueError("time: the index has several levels; give the name of the level or column that is the clock")
+            options: dict[str, Any] = {"sample_time": sample_time, "resample": resample, "uniform": uniform}
+            run_logs = [cls.from_dataframe(run, inputs=names, output=outputs, time=time, **options) for run, _ in runs]
+            joined = cls.join(run_logs)
+            if resample is not None:
+                return joined
+            index = _clock.common_index([("frame", frame)])
+            rows = _clock.labels_of(index[np.concatenate([rows for _, rows in runs])])
+            return cls._of(joined._log, joined._clock._replace(rows=rows))
         columns = _frames.columns(frame, [*names, *outputs])
         channels = [(name, columns[name]) for name in [*names, *outputs]]
         index, clock, argument = _clock.common_index([("frame", frame)]), None, "time"

@@ -297,13 +297,15 @@ def fit_many(
     work = Work(fit, options, dict(read or {}))
     journal = work.journal(reports)
 
+    stop = _thetahat.Stop()
+
     def one(place: int) -> tuple[dict[str, Any], Any]:
         name, item = named[place]
-        before = _thetahat.threads(count)
+        before = _thetahat.threads(count, stop)
         try:
             return work(name, item, files[place], journal)
         finally:
-            _thetahat.threads(before)
+            _thetahat.threads(*before)
 
     with ExitStack() as stack:
         if journal is not None:
@@ -315,6 +317,7 @@ def fit_many(
         except BaseException:
             for future in futures:
                 future.cancel()
+            stop.ask()
             raise
     return Fits([row for row, _ in outcomes], checked([found for _, found in outcomes]))
 

@@ -410,11 +410,11 @@ def _answers(part: Iterable[Log], questions: Iterable[bytes], own: Sequence[str]
 @contextmanager
 def _shared() -> Iterator[None]:
     """What is done here shares the threads of the worker."""
-    before = _thetahat.threads(_threads())
+    before = _thetahat.threads(_threads(), None)
     try:
         yield
     finally:
-        _thetahat.threads(before)
+        _thetahat.threads(*before)
 
 
 def _lags(

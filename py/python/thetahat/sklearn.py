@@ -1,7 +1,8 @@
 """ARX, nonlinear ARX and state-space models as estimators of scikit-learn, for its pipelines, searches and scores.
 
-Rows are samples in the order of time, at equal distances. Whatever splits them has to keep that order and to leave no holes:
-`sklearn.model_selection.TimeSeriesSplit` does, shuffled folds do not.
+Rows are samples in the order of time, at equal distances. Whatever splits them has to keep that order:
+`sklearn.model_selection.TimeSeriesSplit` does, shuffled folds do not. An index of pandas tells: of times it is the clock, of whole
+numbers it counts rows; nothing reaches across what is left out of either, and rows out of order are an error.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat import Log, Model, NarxOptions, _numbers, arx, narx, ss
+from thetahat import Log, Model, NarxOptions, _clock, _numbers, arx, narx, ss
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -90,7 +91,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """What the regressors have in common: predictions of a fitted model, and the log of an array."""
 
     horizon: int | None
-    sample_time: float
+    sample_time: float | None
     model_: Model
     coef_: NDArray[np.float64]
 
@@ -118,7 +119,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         self._check_horizon()
         inputs = self._inputs(X, reset=True)
-        self.model_ = self._fitted(self._log(inputs, self._output(y, inputs)))
+        self.model_ = self._fitted(self._log(inputs, self._output(y, inputs), self._times(X, y)))
         if hasattr(self, "coef_"):
             del self.coef_
         if self.model_.kind != "state-space":
@@ -157,14 +158,21 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         self._check_horizon()
         inputs = self._inputs(X, reset=False)
+        times = self._times(X, y)
         if self.horizon is None and inputs is not None and self.model_.inputs:
-            return np.asarray(self.model_.simulate(inputs, initial="zero"), dtype=np.float64)
+            clock = self._log(inputs, np.zeros(len(inputs)), times)
+            if times is not None and abs(clock.sample_time / self.model_.sample_time - 1) > _clock.UNIFORM:
+                message = f"X: its rows are {clock.sample_time:g} s apart, those of the fit {self.model_.sample_time:g} s"
+                raise ValueError(f"{message}; resample them first")
+            # A segment of the clock begins at rest.
+            runs = [self.model_.simulate(inputs[rows.start : rows.stop], initial="zero") for rows in clock.segments]
+            return np.asarray(np.concatenate(runs), dtype=np.float64)
         if self.horizon is None:
             if inputs is None and y is None:
                 raise ValueError("y: without inputs it says how many samples to predict; give predict(None, y)")
             count = len(self._output(y, None) if inputs is None else inputs)
             offsets = np.array([self.model_.offsets[name] for name in self.model_.outputs])
-            lines = offsets[:, 0] + self.sample_time * np.arange(count)[:, None] * offsets[:, 1]
+            lines = offsets[:, 0] + self.model_.sample_time * np.arange(count)[:, None] * offsets[:, 1]
             return np.asarray(lines[:, 0] if len(offsets) == 1 else lines, dtype=np.float64)
         if y is None:
             message = (
@@ -176,7 +184,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         if outputs.shape[1:] != self._shape():
             message = f"y: expected {len(self.model_.outputs)} outputs, as in the fit, found an array of shape {outputs.shape}"
             raise ValueError(message)
-        log = self._log(inputs, outputs)
+        log = self._log(inputs, outputs, times)
         return np.asarray(self.model_.predict(log, horizon=int(self.horizon)), dtype=np.float64)
 
     def score(self, X: ArrayLike | None, y: ArrayLike, sample_weight: ArrayLike | None = None) -> float:
@@ -267,17 +275,43 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             check_consistent_length(beside, output)
         return output
 
-    def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64]) -> Log:
+    def _times(self, X: ArrayLike | None, y: ArrayLike | None) -> Any:
+        """The clock in the index that X and y have: times, or the numbers of rows by the sample time."""
+        index = _clock.common_index([("X", X), ("y", y)])
+        if index is None or index.nlevels > 1:
+            return None
+        if _clock.of_index(index) is not None:
+            if self.sample_time is not None:
+                raise ValueError("sample_time: the index is a clock; leave sample_time out, or drop the index (reset_index in pandas)")
+            return index
+        numbers = _clock.labels_of(index).values
+        if numbers.dtype.kind not in "iu" or len(numbers) < 2:
+            return None
+        steps = np.diff(numbers.astype(np.int64))
+        if steps.min() < 1:
+            row = int(np.argmin(steps > 0))
+            message = (
+                f"X: its index goes back from {numbers[row]} in row {row + 1} to {numbers[row + 1]} in row {row + 2}; keep the rows in "
+                "the order of time (shuffled folds do not), or drop the index (reset_index in pandas)"
+            )
+            raise ValueError(message)
+        if steps.max() == steps.min():
+            return None
+        return (numbers - numbers[0]) * (1.0 if self.sample_time is None else self.sample_time)
+
+    def _log(self, inputs: NDArray[np.float64] | None, output: NDArray[np.float64], times: ArrayLike | None) -> Log:
         names = getattr(self, "feature_names_in_", None)
         taken = [] if names is None else [str(name) for name in names]
         # No input may have the name of an output.
         names = ["y"] if output.ndim == 1 else [f"y{number}" for number in range(1, 1 + output.shape[1])]
         while not set(names).isdisjoint(taken):
             names = [name + "_" for name in names]
+        plain = 1.0 if self.sample_time is None else self.sample_time
         return Log(
             output,
             inputs,
-            sample_time=self.sample_time,
+            sample_time=plain if times is None else None,
+            time=times,
             input_names=taken or None,
             output_name=names[0] if output.ndim == 1 else names,
         )
@@ -308,8 +342,8 @@ class ARXRegressor(_Regressor):
         Samples from an input's change to its first effect, for all inputs or one for each.
     horizon : int or None, default=None
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
-    sample_time : float, default=1.0
-        Seconds from one sample to the next.
+    sample_time : float, default=None
+        Seconds from one sample to the next. None: that of the times in the index of pandas that X or y has, else 1.
     estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
     ridge, noise_bound : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
@@ -360,7 +394,7 @@ class ARXRegressor(_Regressor):
         nk: int | Sequence[int] = 1,
         *,
         horizon: int | None = None,
-        sample_time: float = 1.0,
+        sample_time: float | None = None,
         estimate: Rows | None = None,
         validate: Rows | None = None,
         split: tuple[float, float, float] | None = None,
@@ -422,8 +456,8 @@ class NARXRegressor(_Regressor):
         Samples from an input's change to its first effect, for all inputs or one for each.
     horizon : int or None, default=None
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
-    sample_time : float, default=1.0
-        Seconds from one sample to the next.
+    sample_time : float, default=None
+        Seconds from one sample to the next. None: that of the times in the index of pandas that X or y has, else 1.
     regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, drawn, focus, search, \
 max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, split, detrend, offset : default=None
         Which functions, what to fit to and how, as for `thetahat.narx`, see `thetahat.NarxOptions`. Channels are called as the columns
@@ -466,7 +500,7 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         nk: int | Sequence[int] = 1,
         *,
         horizon: int | None = None,
-        sample_time: float = 1.0,
+        sample_time: float | None = None,
         regressors: Sequence[str] | None = None,
         degree: int | None = None,
         terms: int | Sequence[str] | None = None,
@@ -544,8 +578,8 @@ class StateSpaceRegressor(_Regressor):
         Samples that each input waits.
     horizon : int or None, default=None
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
-    sample_time : float, default=1.0
-        Seconds from one sample to the next.
+    sample_time : float, default=None
+        Seconds from one sample to the next. None: that of the times in the index of pandas that X or y has, else 1.
     weighting, past, future, feedthrough, refine, search, max_iterations, tolerance, time_limit, estimate, validate, split, detrend, offset, \
 constant : default=None
         How, as for `thetahat.ss`. Channels are called as the columns of a data frame, else u, or u1, u2, …, and y, or y1, y2, …
@@ -585,7 +619,7 @@ constant : default=None
         nk: int | Sequence[int] | None = None,
         *,
         horizon: int | None = None,
-        sample_time: float = 1.0,
+        sample_time: float | None = None,
         weighting: str | None = None,
         past: int | None = None,
         future: int | None = None,

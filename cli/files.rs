@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::failure::Failure;
-use crate::replace::{behind_links, folder};
+use crate::replace::{behind_links, check, folder};
 
 /// The files of a command line, `-` for standard input or output.
 #[derive(Debug, Default)]
@@ -17,7 +17,8 @@ pub(crate) struct Files {
 impl Files {
     /// Refuses, before anything is written, an output that would replace what is read or another output, under whatever name:
     /// a hard link is the same file, and so is what standard output is redirected to (a program that reads what it writes
-    /// does not end). The same file is told by device and inode.
+    /// does not end). The same file is told by device and inode. Refuses, before anything is computed, an output that cannot be
+    /// written.
     ///
     /// # Errors
     /// As said; that links go round in a circle.
@@ -68,7 +69,7 @@ impl Files {
                 )));
             }
         }
-        Ok(())
+        self.written.iter().filter(|path| path.as_path() != Path::new("-")).try_for_each(|path| check(path))
     }
 }
 

@@ -79,9 +79,12 @@ pub(crate) fn listen() {
     {
         static LISTENING: std::sync::Once = std::sync::Once::new();
         LISTENING.call_once(|| {
-            if let Ok(mut signals) = Signals::new([SIGTERM]) {
-                thread::spawn(move || signals.forever().for_each(|_| asked_by(TERMINATED)));
-            }
+            // Without a thread SIGTERM ends the program as it ends any other.
+            let _ = thread::Builder::new().spawn(|| {
+                if let Ok(mut signals) = Signals::new([SIGTERM]) {
+                    signals.forever().for_each(|_| asked_by(TERMINATED));
+                }
+            });
         });
     }
 }
@@ -96,7 +99,7 @@ fn asked_by(code: u8) {
         if let Some(waker) = &state.waker {
             waker.wake();
             // It may wait for a reader of its output who does not come.
-            thread::spawn(move || {
+            let _ = thread::Builder::new().spawn(move || {
                 thread::sleep(PATIENCE);
                 if self::state().waker.is_some() {
                     asked_by(code);
@@ -185,6 +188,13 @@ pub(crate) fn finish<T>(
     let moved = moving(file)?;
     state.written = true;
     Ok(moved)
+}
+
+/// Removes the file, which was made to see whether one can be.
+pub(crate) fn discard(file: NamedTempFile) -> io::Result<()> {
+    let mut state = state();
+    state.unfinished.retain(|path| path != file.path());
+    file.close()
 }
 
 /// Notes what to clear from the terminal.

@@ -31,6 +31,7 @@ mod output;
 mod progress;
 mod replace;
 mod shell;
+mod threads;
 mod wrap;
 
 use std::ffi::OsString;
@@ -68,6 +69,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     interrupt::listen();
+    threads::share();
     match commands::dispatch(arguments, &shell::line(&words)) {
         Ok(()) => 0,
         Err(failure) => end(&failure),

@@ -50,6 +50,25 @@ pub(crate) fn put(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     Ok(())
 }
 
+/// That a file can be written, before anything is computed for it: its folder takes another one for an instant.
+///
+/// # Errors
+/// What [`replace`] would say.
+pub(crate) fn check(path: &Path) -> Result<(), Failure> {
+    let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
+    let target = behind_links(path).map_err(failed)?;
+    let existing = existing(&target).map_err(failed)?;
+    if existing.as_ref().is_some_and(|metadata| !metadata.is_file()) {
+        return Ok(());
+    }
+    let folder = folder(&target);
+    if let Err(error) = fs::metadata(folder) {
+        return Err(Failure::io(path, "cannot be written: its folder is not there", &error));
+    }
+    let file = interrupt::begin(|| passing(folder, existing.is_none())).map_err(failed)?;
+    interrupt::discard(file).map_err(failed)
+}
+
 /// A file that this run has for itself, and replaces from time to time.
 pub(crate) struct Held {
     path: PathBuf,

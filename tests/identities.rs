@@ -279,6 +279,27 @@ fn the_same_input_gives_the_same_bytes_on_any_number_of_threads() {
     }
 }
 
+/// More threads than the address space has stacks for.
+#[test]
+#[cfg(target_os = "linux")]
+fn without_threads_the_results_are_the_same_bytes() {
+    let folder = Folder::with_log(Experiment::new(8000).csv());
+    let lines = [
+        "fit log.csv --na 2 --nb 2 --report model.json",
+        "predict model.json log.csv",
+        "fit --each log.csv --na 1 --nb 1 --table t.csv",
+    ];
+    for line in lines {
+        let many = folder.done(line);
+        let inner = folder.command(line);
+        let mut command = std::process::Command::new("sh");
+        command.arg("-c").arg("ulimit -v 4000000; exec \"$0\" \"$@\"").arg(inner.get_program());
+        command.args(inner.get_args()).current_dir(folder.path("")).env("RAYON_NUM_THREADS", "4000");
+        let one = Run::of(command);
+        assert_eq!((one.code, one.stdout), (0, many.stdout), "{line}: {}", one.stderr);
+    }
+}
+
 #[test]
 fn predictions_speak_the_logs_own_units() {
     let experiment = Experiment::new(200);

@@ -66,6 +66,24 @@ fn an_output_that_is_an_input_under_another_name_is_refused_before_anything_is_w
 }
 
 #[test]
+fn an_output_that_cannot_be_written_is_told_before_anything_is_read() {
+    let folder = folder();
+    fs::create_dir(folder.path("folder")).unwrap();
+    let names = folder.names();
+    for (line, _) in LINES {
+        // Whoever read the log first would say that it is not there.
+        let line = line.replace("log.csv", "missing.csv").replace(" model.json", " gone.json");
+        for (out, why) in
+            [("nope/x", "nope/x: cannot be written: its folder is not there"), ("folder", "folder: cannot")]
+        {
+            let refusal = folder.refused(&line.replace("OUT", out), 5);
+            assert!(refusal.contains(why), "{line}: {refusal}");
+        }
+    }
+    assert_eq!(folder.names(), names);
+}
+
+#[test]
 fn a_log_that_would_grow_by_what_is_printed_is_noticed() {
     let folder = folder();
     let before = folder.read("log.csv");

@@ -73,12 +73,6 @@ pub(super) fn each(
     work: impl Fn(&Path) -> Result<Done, Failure> + Sync,
 ) -> Result<(), Failure> {
     let table = arguments.table.as_deref().unwrap_or(Path::new("-"));
-    // Told now, and not when all is done.
-    if table != Path::new("-")
-        && let Err(error) = fs::metadata(replace::folder(table))
-    {
-        return Err(Failure::io(table, "cannot be written: its folder is not there", &error));
-    }
     let logs = logs::named(patterns, arguments.list.as_deref(), arguments.reports.is_some())?;
     let journal = arguments.reports.as_deref().map(|folder| Journal::open(folder, common)).transpose()?;
     if let Some((folder, journal)) = arguments.reports.as_deref().zip(journal.as_ref()) {
@@ -168,14 +162,25 @@ impl<W: Fn(&Path) -> Result<Done, Failure> + Sync> Run<'_, W> {
         let workers = threads.min(self.logs.len()).max(1);
         let own = |worker: usize| threads / workers + usize::from(worker < threads % workers);
         interrupt::during(|| {
+            // As many as there are anyway: also where the system has no more than this one.
+            if workers == 1 && threads == rayon::current_num_threads() {
+                self.take();
+                return Ok(());
+            }
+            let refused = |error: &dyn std::error::Error| {
+                self.end(Failure::usage(format!(
+                    "--threads {threads}: the threads cannot be started: {error}; give fewer"
+                )));
+            };
             thread::scope(|scope| {
                 for worker in 0..workers {
-                    scope.spawn(move || match ThreadPoolBuilder::new().num_threads(own(worker)).build() {
+                    let work = move || match ThreadPoolBuilder::new().num_threads(own(worker)).build() {
                         Ok(pool) => pool.install(|| self.take()),
-                        Err(error) => self.end(Failure::usage(format!(
-                            "--threads {threads}: the threads cannot be started: {error}; give fewer"
-                        ))),
-                    });
+                        Err(error) => refused(&error),
+                    };
+                    if let Err(error) = thread::Builder::new().spawn_scoped(scope, work) {
+                        refused(&error);
+                    }
                 }
             });
             Ok(())

@@ -208,7 +208,9 @@ impl ColumnarReader {
             mailbox,
         };
         let sender = stream.mailbox.sender();
-        thread::spawn(move || conversion.send(&sender));
+        let file = conversion.columns.file.clone();
+        let begun = thread::Builder::new().spawn(move || conversion.send(&sender));
+        begun.map_err(|error| Error::no_thread(&file, &error))?;
         Ok(stream)
     }
 

@@ -57,6 +57,16 @@ impl Error {
         Self { kind: ErrorKind::Io, file: file.to_owned(), position: None, message: message.into() }
     }
 
+    /// That the system has no thread for what reads a file.
+    pub(super) fn no_thread(file: &str, error: &std::io::Error) -> Self {
+        Self::io(
+            file,
+            format!(
+                "no thread can be started that reads it: {error}; end other programs, or raise the limit"
+            ),
+        )
+    }
+
     /// An error in what the log holds, or in how it was asked for.
     pub(super) fn data(
         file: &str,

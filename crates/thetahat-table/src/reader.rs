@@ -295,7 +295,7 @@ impl TextReader {
         let Self { source, layout, current, position, line, .. } = self;
         let text = current.raw().get(position..).unwrap_or_default().to_vec();
         let plan = Plan { layout, numbers, clock, fields, time: selection.time };
-        Ok(TextStream::begin(plan, selection, Text { text, line, source, whole_lines, start: first }))
+        TextStream::begin(plan, selection, Text { text, line, source, whole_lines, start: first })
     }
 
     /// The selected fields in ascending order, if the selection makes sense.

@@ -60,14 +60,17 @@ pub(super) struct Text {
 }
 
 impl TextStream {
-    pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Self {
+    /// # Errors
+    /// That the system has no thread that reads ahead.
+    pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Result<Self, Error> {
         let Text { text, line, source, whole_lines, start } = text;
         let mailbox = Mailbox::new();
         let (spent, empty) = channel();
         let pieces = mailbox.sender();
-        thread::spawn(move || read(source, &pieces, &empty));
+        let begun = thread::Builder::new().spawn(move || read(source, &pieces, &empty));
+        begun.map_err(|error| Error::no_thread(&plan.layout.file, &error))?;
         let place = |field: &usize| plan.fields.binary_search(field).unwrap_or_default();
-        Self {
+        Ok(Self {
             fields: vec![0.0; plan.fields.len()],
             values: vec![0.0; selection.columns.len()],
             places: selection.columns.iter().map(place).collect(),
@@ -84,7 +87,7 @@ impl TextStream {
             ended: false,
             mailbox,
             spent,
-        }
+        })
     }
 
     /// What ends this stream early.

@@ -10,6 +10,8 @@ use crate::Error;
 
 /// Most substeps of a step.
 const MOST_SUBSTEPS: f64 = 1000.0;
+/// Most states and unknown parameters together, inputs, and outputs: a row of a filter takes the cube of the first.
+const MOST: usize = 200;
 
 /// Reads a model; parameters in `known` are known, whatever the text says.
 pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Error> {
@@ -35,6 +37,10 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         Some(section) => parameters(&section, known)?,
         None => Vec::new(),
     };
+    let unknowns = parameters.iter().filter(|(_, parameter)| matches!(parameter, Given::Unknown(_)));
+    let estimated: Vec<&Entry<'_>> = states.iter().chain(unknowns.map(|(entry, _)| entry)).collect();
+    few(&estimated, "states and unknown parameters together")?;
+    few(&inputs.iter().map(|(entry, _)| entry).collect::<Vec<_>>(), "inputs")?;
     let (step, equations) = equations(&root)?;
 
     let mut graph = Graph::new();
@@ -83,6 +89,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     if outputs.is_empty() {
         return Err(observed.error("[outputs] is empty: a filter needs something that is measured"));
     }
+    few(&outputs.iter().collect::<Vec<_>>(), "outputs")?;
     let seen = outputs.iter().map(|entry| scope.read(entry, &mut graph)).collect::<Result<Vec<_>, _>>()?;
     if let Some((entry, _)) = inputs.iter().find(|(_, channel)| outputs.iter().any(|out| out.key == channel))
     {
@@ -125,6 +132,16 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         process_variances,
         measurement_variances,
     })
+}
+
+/// That there are no more of something than a filter can take.
+fn few(entries: &[&Entry<'_>], what: &str) -> Result<(), Error> {
+    match entries.get(MOST) {
+        Some(entry) => {
+            Err(entry.error(format!("there are {} {what}, and equations have up to {MOST}", entries.len())))
+        }
+        None => Ok(()),
+    }
 }
 
 /// The programs of some nodes and their derivatives, and the derivatives by the states.

@@ -194,3 +194,32 @@ fn no_text_is_a_panic() {
     // Most are refused, and some edits do no harm.
     assert!((10..1500).contains(&read), "{read}");
 }
+
+/// Before anything that grows with the square of their number is computed.
+#[test]
+fn equations_have_a_size() {
+    let list = |count: usize, line: &dyn Fn(usize) -> String| (0..count).map(line).collect::<String>();
+    let text = |states: usize, unknowns: usize, inputs: usize, outputs: usize| {
+        format!(
+            "sample_time = 1\n[inputs]\n{}[parameters]\n{}[states]\n{}[next]\n{}[outputs]\n{}[noise]\nmeasurement = {{ {} }}\n",
+            list(inputs, &|index| format!("u{index} = 'u{index}'\n")),
+            list(unknowns, &|index| format!("p{index} = {{ start = 0, sd = 1, unknown = true }}\n")),
+            list(states, &|index| format!("x{index} = {{ start = 0, sd = 1 }}\n")),
+            list(states, &|index| format!("x{index} = '0.9 * x{index}'\n")),
+            list(outputs, &|index| format!("y{index} = 'x0'\n")),
+            (0..outputs).map(|index| format!("y{index} = 1")).collect::<Vec<_>>().join(", "),
+        )
+    };
+    assert!(GreyBox::from_toml(&text(2, 3, 2, 2)).is_ok());
+    let together = "states and unknown parameters together, and equations have up to 200";
+    for (text, expected) in [
+        (text(10_000, 0, 0, 1), format!("there are 10000 {together}")),
+        (text(1, 10_000, 0, 1), format!("there are 10001 {together}")),
+        (text(101, 100, 0, 1), format!("there are 201 {together}")),
+        (text(1, 0, 201, 1), "there are 201 inputs, and".to_owned()),
+        (text(1, 0, 0, 201), "there are 201 outputs, and".to_owned()),
+    ] {
+        let error = GreyBox::from_toml(&text).unwrap_err().to_string();
+        assert!(error.starts_with("line ") && error.contains(&expected), "{error}");
+    }
+}

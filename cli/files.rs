@@ -12,6 +12,8 @@ use crate::replace::{behind_links, check, folder};
 pub(crate) struct Files {
     pub(crate) read: Vec<PathBuf>,
     pub(crate) written: Vec<PathBuf>,
+    /// Whether folders that are not there are made for what is written.
+    pub(crate) makes_folders: bool,
 }
 
 impl Files {
@@ -69,7 +71,7 @@ impl Files {
                 )));
             }
         }
-        self.written.iter().filter(|path| path.as_path() != Path::new("-")).try_for_each(|path| check(path))
+        self.written.iter().filter(|path| path.as_path() != Path::new("-")).try_for_each(|path| check(path, self.makes_folders))
     }
 }
 

@@ -50,18 +50,22 @@ pub(crate) fn put(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     Ok(())
 }
 
-/// That a file can be written, before anything is computed for it: its folder takes another one for an instant.
+/// That a file can be written, before anything is computed for it: its folder takes another one for an instant, or that in which it
+/// will be made.
 ///
 /// # Errors
 /// What [`replace`] would say.
-pub(crate) fn check(path: &Path) -> Result<(), Failure> {
+pub(crate) fn check(path: &Path, makes_folders: bool) -> Result<(), Failure> {
     let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
     let target = behind_links(path).map_err(failed)?;
     let existing = existing(&target).map_err(failed)?;
     if existing.as_ref().is_some_and(|metadata| !metadata.is_file()) {
         return Ok(());
     }
-    let folder = folder(&target);
+    let mut folder = folder(&target);
+    if makes_folders {
+        folder = folder.ancestors().find(|folder| folder.exists()).unwrap_or(Path::new("."));
+    }
     if let Err(error) = fs::metadata(folder) {
         return Err(Failure::io(path, "cannot be written: its folder is not there", &error));
     }

@@ -19,15 +19,19 @@ pub(crate) fn share() {
     let count = asked.filter(|&count: &usize| count > 0).unwrap_or_else(cores);
     let (sender, receiver) = channel();
     let receiver = Arc::new(Mutex::new(receiver));
-    let all_begun = (0..count).all(|_| {
+    let begin = |_| {
         let receiver = Arc::clone(&receiver);
-        thread::Builder::new().spawn(move || serve(&receiver)).is_ok()
-    });
+        thread::Builder::new().spawn(move || serve(&receiver))
+    };
+    let begun: Vec<thread::JoinHandle<()>> = (0..count).map_while(|index| begin(index).ok()).collect();
     // An earlier run in this process may have made the pool: then it stays, and the threads of this one end.
-    let _ = if all_begun {
+    let _ = if begun.len() == count {
         let hand_over = |work: ThreadBuilder| sender.send(work).map_err(|_| io::ErrorKind::BrokenPipe.into());
         ThreadPoolBuilder::new().num_threads(count).spawn_handler(hand_over).build_global()
     } else {
+        // Their stacks are memory for the work.
+        drop(sender);
+        begun.into_iter().for_each(|thread| drop(thread.join()));
         ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()
     };
 }

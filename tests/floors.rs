@@ -76,7 +76,7 @@ const TABLE: House = House {
 const COMMAND_LINE: House = House {
     source: "cli",
     floors: &[
-        &["main", "memory", "options", "shell", "wrap"],
+        &["main", "memory", "options", "shell", "threads", "wrap"],
         &["messages"],
         &["failure"],
         &["interrupt"],

@@ -9,7 +9,7 @@ impl Command {
     /// The files that a verb reads and writes.
     pub(crate) fn files(&self) -> Files {
         let mut files = Files::default();
-        let Files { read, written } = &mut files;
+        let Files { read, written, makes_folders } = &mut files;
         match self {
             Self::Fit(fit) => {
                 read.extend(fit.grey.iter().chain(&fit.logs).cloned());
@@ -88,6 +88,7 @@ impl Command {
                 read.extend([&export.report].into_iter().chain(&export.path).cloned());
                 let names = export.plan().files(export.path.is_some());
                 written.extend(names.iter().map(|name| export.out.join(name)));
+                *makes_folders = true;
             }
             Self::Design(design) => {
                 read.extend(design.model.clone());

@@ -129,7 +129,7 @@ fn check_documents(folder: &Path, journal: &Journal, logs: &[Named], table: &Pat
         }
         read.push(report);
     }
-    Files { read, written: vec![table.to_owned()] }.check()
+    Files { read, written: vec![table.to_owned()], ..Files::default() }.check()
 }
 
 /// Whether these are two files; one that is not there any more is none.

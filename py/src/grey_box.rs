@@ -1,6 +1,5 @@
 //! Models in equations, before a fit.
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::error;
@@ -15,14 +14,6 @@ impl GreyBox {
     #[new]
     fn new(py: Python<'_>, text: &str) -> PyResult<Self> {
         Ok(Self(thetahat::model::GreyBox::from_toml(text).map_err(|error| error::batch(py, error))?))
-    }
-
-    /// The text in TOML of a document in JSON.
-    #[staticmethod]
-    fn toml_of(json: &str) -> PyResult<String> {
-        let document: toml::Table =
-            serde_json::from_str(json).map_err(|error| PyValueError::new_err(format!("model: {error}")))?;
-        toml::to_string(&document).map_err(|error| PyValueError::new_err(format!("model: {error}")))
     }
 
     /// The same model with values of unknown parameters that are known by now.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from types import SimpleNamespace
@@ -125,7 +126,7 @@ class GreyBox:
 
     def __init__(self, model: str | os.PathLike[str] | Mapping[str, Any]) -> None:
         if isinstance(model, Mapping):
-            text = _thetahat.GreyBox.toml_of(json.dumps(_plain("model", model), allow_nan=False))
+            text = _toml(_plain("model", model))
         elif isinstance(model, str) and ("\n" in model or "=" in model):
             text = model
         else:
@@ -307,6 +308,30 @@ def _plain(name: str, value: Any) -> Any:
     if not isinstance(plain, (bool, int, float, str)):
         raise TypeError(f"{name}: expected a number, a text or a dict, found {plain!r}")
     return plain
+
+
+def _toml(model: Mapping[str, Any]) -> str:
+    """The text of a model, in which names stand in the order in which they were given."""
+    tables = {name: value for name, value in model.items() if isinstance(value, dict)}
+    lines = [f"{_key(name)} = {_inline(value)}" for name, value in model.items() if name not in tables]
+    for name, table in tables.items():
+        lines += ["", f"[{_key(name)}]", *(f"{_key(key)} = {_inline(value)}" for key, value in table.items())]
+    return "\n".join([*lines, ""])
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in value.items()) + " }" if value else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(_inline(entry) for entry in value)}]"
+    if isinstance(value, str):
+        # TOML has JSON's escapes, and wants DEL as one too.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
 
 
 Equations = Union[GreyBox, str, "os.PathLike[str]", Mapping[str, Any]]

@@ -71,7 +71,10 @@ impl Files {
                 )));
             }
         }
-        self.written.iter().filter(|path| path.as_path() != Path::new("-")).try_for_each(|path| check(path, self.makes_folders))
+        self.written
+            .iter()
+            .filter(|path| path.as_path() != Path::new("-"))
+            .try_for_each(|path| check(path, self.makes_folders))
     }
 }
 

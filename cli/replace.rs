@@ -89,6 +89,7 @@ impl Held {
     pub(crate) fn open(path: &Path) -> Result<Self, Failure> {
         let failed = |error: io::Error| Failure::io(path, "cannot be read", &error);
         let target = behind_links(path).map_err(failed)?;
+        sweep(folder(&target));
         let held = |file| Self { path: path.to_owned(), target: target.clone(), file };
         loop {
             let file = match File::open(&target) {
@@ -123,9 +124,6 @@ impl Held {
         let Self { path, target, file } = self;
         let failed = |error: io::Error| Failure::io(path, "cannot be written", &plain(error));
         let existing = existing(target).map_err(failed)?;
-        if file.is_none() {
-            sweep(folder(target));
-        }
         let new = filled(target, existing.as_ref(), |new| new.write_all(bytes)).map_err(failed)?;
         // Windows does not replace what is open.
         let is_first = if cfg!(windows) { file.take().is_none() } else { file.is_none() };

@@ -308,3 +308,23 @@ fn inspections_and_validations_have_tables_too() {
     let codes: Vec<Value> = rows(&run.stdout).into_iter().map(|row| row["exit_code"].clone()).collect();
     assert_eq!(codes, ["6", "6", "6", "3"]);
 }
+
+/// It can be read once: for the work, and not for the journal.
+#[test]
+#[cfg(unix)]
+fn a_log_may_come_through_a_pipe() {
+    let folder = Folder::with_log(plain_log());
+    let made = std::process::Command::new("mkfifo").arg(folder.path("pipe")).status().expect("it is there");
+    assert!(made.success());
+    let line = "fit --each pipe log.csv --na 1 --nb 1 --table t.csv --reports out";
+    for run in 0..2 {
+        let (pipe, log) = (folder.path("pipe"), folder.read("log.csv"));
+        let writer = std::thread::spawn(move || std::fs::write(pipe, log));
+        let done = folder.done(line);
+        writer.join().expect("it does not panic").expect("somebody reads");
+        // Only the file is known.
+        assert_eq!(done.stdout.contains("1 as in an earlier run"), run == 1, "{}", done.stdout);
+        let of = |name: &str| -> Value { serde_json::from_str(&folder.read(name)).expect("it is JSON") };
+        assert_eq!(of("out/pipe.json")["model"]["a"], of("out/log.json")["model"]["a"]);
+    }
+}

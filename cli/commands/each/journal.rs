@@ -89,7 +89,7 @@ impl Journal {
         Ok(Self { path, file: Mutex::new(file), known, common, reused: AtomicUsize::new(0) })
     }
 
-    /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read.
+    /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read, or is a pipe.
     pub fn digest(&self, log: &Path) -> Option<String> {
         digest(self.common.as_bytes(), log)
     }
@@ -140,6 +140,10 @@ fn document(path: &Path) -> Option<String> {
 
 /// The digest of some bytes and of a file.
 fn digest(before: &[u8], path: &Path) -> Option<String> {
+    // What a pipe holds can be read once, and is read for the work.
+    if !fs::metadata(path).ok()?.is_file() {
+        return None;
+    }
     let mut hasher = XxHash3_128::new();
     hasher.write(before);
     hasher.write(&[0]);

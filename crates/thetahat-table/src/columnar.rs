@@ -5,6 +5,8 @@
 
 mod batches;
 mod clock;
+mod footer;
+mod messages;
 mod values;
 
 #[cfg(test)]

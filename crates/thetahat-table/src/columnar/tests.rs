@@ -499,3 +499,96 @@ fn every_compression_is_unpacked() {
         );
     }
 }
+
+/// What begins a buffer says how long it will be: it is counted before memory is taken for as much.
+#[test]
+fn lengths_that_are_made_up_take_no_memory() {
+    let rows = 10_000;
+    let batch = batch(&[("y", numbers(vec![1.0; rows])), ("u", numbers((0..rows).map(|row| row as f64)))]);
+    for codec in [CompressionType::LZ4_FRAME, CompressionType::ZSTD] {
+        let options = IpcWriteOptions::default().try_with_compression(Some(codec)).unwrap();
+        let (mut file, mut stream) = (Vec::new(), Vec::new());
+        let mut writer =
+            FileWriter::try_new_with_options(&mut file, &batch.schema(), options.clone()).unwrap();
+        writer.write(&batch).unwrap();
+        writer.finish().unwrap();
+        let mut writer = StreamWriter::try_new_with_options(&mut stream, &batch.schema(), options).unwrap();
+        writer.write(&batch).unwrap();
+        writer.finish().unwrap();
+        for whole in [file, stream] {
+            let length = (8 * rows as i64).to_le_bytes();
+            let place = whole.windows(8).position(|bytes| bytes == length).unwrap();
+            for made_up in [1 << 60, 1 << 21, i64::MAX, 8 * rows as i64 + 8, -2] {
+                let mut damaged = whole.clone();
+                damaged[place..place + 8].copy_from_slice(&i64::to_le_bytes(made_up));
+                let message = error(&damaged, &["y"], None);
+                assert!(message.starts_with("it is damaged after 0 rows ("), "{made_up}: {message}");
+            }
+        }
+    }
+}
+
+/// What is constant is packed into nearly nothing, and read all the same.
+#[test]
+fn a_long_constant_column_is_no_damage() {
+    let rows = 1_000_000;
+    let batch = batch(&[("y", numbers(vec![1.0; rows]))]);
+    let options = IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD)).unwrap();
+    let mut file = Vec::new();
+    let mut writer = FileWriter::try_new_with_options(&mut file, &batch.schema(), options).unwrap();
+    writer.write(&batch).unwrap();
+    writer.finish().unwrap();
+    assert!(file.len() < 10_000, "{}", file.len());
+    assert_eq!(read(&file, &["y"], None, &Options::default()).unwrap().columns[0], vec![1.0; rows]);
+}
+
+/// A Parquet file of a schema: how many children each column has, the root first.
+fn parquet_of(children: &[u32]) -> Vec<u8> {
+    fn integer(mut value: u64, bytes: &mut Vec<u8>) {
+        while value >= 0x80 {
+            bytes.push(value as u8 | 0x80);
+            value >>= 7;
+        }
+        bytes.push(value as u8);
+    }
+    // Version 2; a list of structs.
+    let mut directory = vec![0x15, 4, 0x19, 0xfc];
+    integer(children.len() as u64, &mut directory);
+    for &children in children {
+        // The name x in field 4; the number of children, with its sign in the last bit, in field 5.
+        directory.extend([0x48, 1, b'x', 0x15]);
+        integer(2 * u64::from(children), &mut directory);
+        directory.push(0);
+    }
+    // No rows, no groups of rows.
+    directory.extend([0x16, 0, 0x19, 0x0c, 0]);
+    let length = u32::try_from(directory.len()).unwrap();
+    [b"PAR1".as_slice(), &directory, &length.to_le_bytes(), b"PAR1"].concat()
+}
+
+#[test]
+fn the_directory_of_a_parquet_file_is_bounded() {
+    let deep: Vec<u32> = std::iter::repeat_n(1, 20_000).chain([0]).collect();
+    for (children, why) in [
+        (deep.as_slice(), "its columns are nested too deep"),
+        (&[2_000_000_000], "a column has more children than there are columns"),
+        (&[1, 3, 0], "a column has more children than there are columns"),
+    ] {
+        let message = error(&parquet_of(children), &[], None);
+        assert!(message.contains(why), "{message}");
+    }
+    // A list of more elements than there are bytes, and structs in structs.
+    let whole = parquet_of(&[1, 0]);
+    let directory = &whole[4..whole.len() - 8];
+    assert_eq!(super::footer::fault(directory), None);
+    let mut long = directory.to_vec();
+    long.splice(4..5, [0xff, 0xff, 0xff, 0xff, 0x0f]);
+    let ends = Some("its directory ends before what it says that it holds");
+    assert_eq!(super::footer::fault(&long), ends);
+    assert_eq!(super::footer::fault(&[0x1c; 1_000_000]), ends);
+    assert_eq!(super::footer::fault(&[0x19; 1_000_000]), ends);
+    // Wherever it is cut.
+    for end in 0..directory.len() {
+        assert_eq!(super::footer::fault(&directory[..end]), ends, "{end}");
+    }
+}

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Once};
 
 use arrow_array::RecordBatch;
-use arrow_ipc::reader::StreamReader;
+use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
@@ -23,9 +23,6 @@ use super::messages::Messages;
 
 /// The rows of a batch of Parquet, at most. What Arrow writes comes as it was written.
 const BATCH: usize = 1 << 14;
-
-/// What an Arrow file begins with, filled up to eight bytes, and ends with.
-const MARK: &[u8; 8] = b"ARROW1\0\0";
 
 /// A format, with its article.
 pub(super) fn named(format: Format) -> &'static str {
@@ -45,7 +42,12 @@ pub(super) enum Opened {
         length: u64,
         metadata: ArrowReaderMetadata,
     },
-    /// A stream, or a file, which is a stream between two marks. From the schema on.
+    File {
+        name: String,
+        file: File,
+        length: u64,
+    },
+    /// From the schema on.
     Stream {
         name: String,
         bytes: Box<dyn Read + Send>,
@@ -78,27 +80,26 @@ impl Opened {
                 named(format)
             )),
             Format::Parquet => Self::parquet(path, name),
-            Format::ArrowFile => {
-                whole_file(path, &name)?;
-                Self::stream(name, bytes, true)
+            Format::ArrowFile => Self::file(path, name),
+            Format::ArrowStream => {
+                let (bytes_read, total) = bytes.progress();
+                // A message begins with a few bytes each.
+                let bytes = Messages::new(BufReader::with_capacity(1 << 16, bytes.into_reader()));
+                let mut kept = Kept { bytes, copy: Vec::new() };
+                let stream: Box<dyn Read + Send + '_> = Box::new(&mut kept);
+                let schema = guarded(|| StreamReader::try_new(stream, None).map(|reader| reader.schema()))
+                    .map_err(|error| damaged(&name, 0, &error))?;
+                let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
+                Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
             }
-            Format::ArrowStream => Self::stream(name, bytes, false),
         }
     }
 
-    fn stream(name: String, bytes: Bytes, is_file: bool) -> Result<(Self, SchemaRef), Error> {
-        let (bytes_read, total) = bytes.progress();
-        let cannot = |error: &ArrowError| damaged(&name, 0, error);
-        // A message begins with a few bytes each.
-        let mut bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());
-        let read = if is_file { after_mark(&mut bytes) } else { Ok(Vec::new()) };
-        let bytes = Cursor::new(read.map_err(|error| cannot(&error.into()))?).chain(bytes);
-        let mut kept = Kept { bytes: Messages::new(bytes), copy: Vec::new() };
-        let stream: Box<dyn Read + Send + '_> = Box::new(&mut kept);
-        let schema = guarded(|| StreamReader::try_new(stream, None).map(|reader| reader.schema()))
-            .map_err(|error| cannot(&error))?;
-        let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
-        Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
+    fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+        let (file, length) = opened(path, &name)?;
+        let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(file.try_clone()?), None)?.schema()))
+            .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
+        Ok((Self::File { name, file, length }, schema))
     }
 
     fn parquet(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
@@ -119,7 +120,7 @@ impl Opened {
             Self::Parquet { metadata, .. } => {
                 usize::try_from(metadata.metadata().file_metadata().num_rows()).ok()
             }
-            Self::Stream { .. } => None,
+            Self::File { .. } | Self::Stream { .. } => None,
         }
     }
 
@@ -135,6 +136,11 @@ impl Opened {
                 let build = || Ok(builder.with_projection(mask).with_batch_size(BATCH).build()?);
                 let reader = Box::new(guarded(build).map_err(said)?);
                 (name, Form::Parquet { reader, length, of: rows })
+            }
+            Self::File { name, file, length } => {
+                let build = || FileReader::try_new(BufReader::new(file), Some(columns));
+                let reader = Box::new(guarded(build).map_err(said)?);
+                (name, Form::File { reader, length, read: 0 })
             }
             Self::Stream { name, bytes, bytes_read, total } => {
                 let build = || StreamReader::try_new(bytes, Some(columns));
@@ -162,6 +168,12 @@ enum Form {
         /// How many rows there are.
         of: u64,
     },
+    File {
+        reader: Box<FileReader<BufReader<File>>>,
+        length: u64,
+        /// How many batches came.
+        read: usize,
+    },
     Stream {
         reader: Box<StreamReader<Box<dyn Read + Send>>>,
         bytes_read: Arc<AtomicU64>,
@@ -176,6 +188,7 @@ impl Batches {
             |part: f64, all: f64, length: u64| ((length as f64 * part / all.max(1.0)) as u64, Some(length));
         match &self.form {
             Form::Parquet { length, of, .. } => share(self.rows as f64, *of as f64, *length),
+            Form::File { reader, length, read } => share(*read as f64, reader.num_batches() as f64, *length),
             Form::Stream { bytes_read, total, .. } => (bytes_read.load(Ordering::Relaxed), *total),
         }
     }
@@ -187,6 +200,10 @@ impl Iterator for Batches {
     fn next(&mut self) -> Option<Self::Item> {
         let batch = match &mut self.form {
             Form::Parquet { reader, .. } => guarded(|| reader.next().transpose()),
+            Form::File { reader, read, .. } => {
+                *read += 1;
+                guarded(|| reader.next().transpose())
+            }
             Form::Stream { reader, .. } => guarded(|| reader.next().transpose()),
         };
         match batch.transpose()? {
@@ -243,27 +260,6 @@ fn opened(path: &Path, name: &str) -> Result<(File, u64), Error> {
         Ok((file, length))
     });
     opened.map_err(|error| Error::io(name, format!("cannot be read: {error}")))
-}
-
-/// That an Arrow file ends as it begins.
-fn whole_file(path: &Path, name: &str) -> Result<(), Error> {
-    let (mut file, _) = opened(path, name)?;
-    let mark = &MARK[..6];
-    let mut end = [0; 6];
-    let is_whole =
-        file.seek(SeekFrom::End(-6)).and_then(|_| file.read_exact(&mut end)).is_ok() && end == mark;
-    let error = ArrowError::ParseError("it does not end with the mark of an Arrow file".to_owned());
-    if is_whole { Ok(()) } else { Err(no_whole_file(name, "Arrow", &error)) }
-}
-
-/// Passes the mark of an Arrow file, which is filled up with zeros to a number of words, and gives the word that follows.
-fn after_mark(bytes: &mut impl Read) -> io::Result<Vec<u8>> {
-    let mut word = *MARK;
-    bytes.read_exact(&mut word)?;
-    while word == *MARK || word == [0; 8] {
-        bytes.read_exact(&mut word)?;
-    }
-    Ok(word.to_vec())
 }
 
 /// The bytes of the directory at the end of a Parquet file; none where there is none, which its reader says.

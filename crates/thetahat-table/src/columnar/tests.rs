@@ -507,23 +507,17 @@ fn lengths_that_are_made_up_take_no_memory() {
     let batch = batch(&[("y", numbers(vec![1.0; rows])), ("u", numbers((0..rows).map(|row| row as f64)))]);
     for codec in [CompressionType::LZ4_FRAME, CompressionType::ZSTD] {
         let options = IpcWriteOptions::default().try_with_compression(Some(codec)).unwrap();
-        let (mut file, mut stream) = (Vec::new(), Vec::new());
-        let mut writer =
-            FileWriter::try_new_with_options(&mut file, &batch.schema(), options.clone()).unwrap();
+        let mut whole = Vec::new();
+        let mut writer = StreamWriter::try_new_with_options(&mut whole, &batch.schema(), options).unwrap();
         writer.write(&batch).unwrap();
         writer.finish().unwrap();
-        let mut writer = StreamWriter::try_new_with_options(&mut stream, &batch.schema(), options).unwrap();
-        writer.write(&batch).unwrap();
-        writer.finish().unwrap();
-        for whole in [file, stream] {
-            let length = (8 * rows as i64).to_le_bytes();
-            let place = whole.windows(8).position(|bytes| bytes == length).unwrap();
-            for made_up in [1 << 60, 1 << 21, i64::MAX, 8 * rows as i64 + 8, -2] {
-                let mut damaged = whole.clone();
-                damaged[place..place + 8].copy_from_slice(&i64::to_le_bytes(made_up));
-                let message = error(&damaged, &["y"], None);
-                assert!(message.starts_with("it is damaged after 0 rows ("), "{made_up}: {message}");
-            }
+        let length = (8 * rows as i64).to_le_bytes();
+        let place = whole.windows(8).position(|bytes| bytes == length).unwrap();
+        for made_up in [1 << 60, 1 << 21, i64::MAX, 8 * rows as i64 + 8, -2] {
+            let mut damaged = whole.clone();
+            damaged[place..place + 8].copy_from_slice(&i64::to_le_bytes(made_up));
+            let message = error(&damaged, &["y"], None);
+            assert!(message.starts_with("it is damaged after 0 rows ("), "{made_up}: {message}");
         }
     }
 }
@@ -534,12 +528,12 @@ fn a_long_constant_column_is_no_damage() {
     let rows = 1_000_000;
     let batch = batch(&[("y", numbers(vec![1.0; rows]))]);
     let options = IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD)).unwrap();
-    let mut file = Vec::new();
-    let mut writer = FileWriter::try_new_with_options(&mut file, &batch.schema(), options).unwrap();
+    let mut stream = Vec::new();
+    let mut writer = StreamWriter::try_new_with_options(&mut stream, &batch.schema(), options).unwrap();
     writer.write(&batch).unwrap();
     writer.finish().unwrap();
-    assert!(file.len() < 10_000, "{}", file.len());
-    assert_eq!(read(&file, &["y"], None, &Options::default()).unwrap().columns[0], vec![1.0; rows]);
+    assert!(stream.len() < 10_000, "{}", stream.len());
+    assert_eq!(read(&stream, &["y"], None, &Options::default()).unwrap().columns[0], vec![1.0; rows]);
 }
 
 /// A Parquet file of a schema: how many children each column has, the root first.

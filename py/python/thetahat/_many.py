@@ -311,14 +311,11 @@ def fit_many(
         if journal is not None:
             stack.callback(journal.close)
         pool = stack.enter_context(ThreadPoolExecutor(min(count, len(named))))
+        # Whatever ends this, and Ctrl-C too: what waits is not begun, and what is under way ends.
+        stack.callback(pool.shutdown, wait=False, cancel_futures=True)
+        stack.callback(stop.ask)
         futures = [pool.submit(one, place) for place in range(len(named))]
-        try:
-            outcomes = [future.result() for future in futures]
-        except BaseException:
-            for future in futures:
-                future.cancel()
-            stop.ask()
-            raise
+        outcomes = [future.result() for future in futures]
     return Fits([row for row, _ in outcomes], checked([found for _, found in outcomes]))
 
 

@@ -19,7 +19,7 @@ use parquet::arrow::arrow_reader::{
 use super::super::error::{Error, escaped};
 use super::super::source::{Bytes, Format};
 use super::footer;
-use super::messages::Messages;
+use super::messages::{Blocks, Messages};
 
 /// The rows of a batch of Parquet, at most. What Arrow writes comes as it was written.
 const BATCH: usize = 1 << 14;
@@ -46,6 +46,7 @@ pub(super) enum Opened {
         name: String,
         file: File,
         length: u64,
+        blocks: Option<Blocks>,
     },
     /// From the schema on.
     Stream {
@@ -97,9 +98,10 @@ impl Opened {
 
     fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
         let (file, length) = opened(path, &name)?;
+        let blocks = Blocks::of(opened(path, &name)?.0).map_err(|error| damaged(&name, 0, &error.into()))?;
         let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(file.try_clone()?), None)?.schema()))
             .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
-        Ok((Self::File { name, file, length }, schema))
+        Ok((Self::File { name, file, length, blocks }, schema))
     }
 
     fn parquet(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
@@ -137,10 +139,10 @@ impl Opened {
                 let reader = Box::new(guarded(build).map_err(said)?);
                 (name, Form::Parquet { reader, length, of: rows })
             }
-            Self::File { name, file, length } => {
+            Self::File { name, file, length, blocks } => {
                 let build = || FileReader::try_new(BufReader::new(file), Some(columns));
                 let reader = Box::new(guarded(build).map_err(said)?);
-                (name, Form::File { reader, length, read: 0 })
+                (name, Form::File { reader, length, blocks, read: 0 })
             }
             Self::Stream { name, bytes, bytes_read, total } => {
                 let build = || StreamReader::try_new(bytes, Some(columns));
@@ -171,6 +173,7 @@ enum Form {
     File {
         reader: Box<FileReader<BufReader<File>>>,
         length: u64,
+        blocks: Option<Blocks>,
         /// How many batches came.
         read: usize,
     },
@@ -188,7 +191,9 @@ impl Batches {
             |part: f64, all: f64, length: u64| ((length as f64 * part / all.max(1.0)) as u64, Some(length));
         match &self.form {
             Form::Parquet { length, of, .. } => share(self.rows as f64, *of as f64, *length),
-            Form::File { reader, length, read } => share(*read as f64, reader.num_batches() as f64, *length),
+            Form::File { reader, length, read, .. } => {
+                share(*read as f64, reader.num_batches() as f64, *length)
+            }
             Form::Stream { bytes_read, total, .. } => (bytes_read.load(Ordering::Relaxed), *total),
         }
     }
@@ -200,9 +205,10 @@ impl Iterator for Batches {
     fn next(&mut self) -> Option<Self::Item> {
         let batch = match &mut self.form {
             Form::Parquet { reader, .. } => guarded(|| reader.next().transpose()),
-            Form::File { reader, read, .. } => {
+            Form::File { reader, read, blocks, .. } => {
+                let checked = blocks.as_mut().map_or(Ok(()), |blocks| blocks.check(*read));
                 *read += 1;
-                guarded(|| reader.next().transpose())
+                checked.map_err(ArrowError::from).and_then(|()| guarded(|| reader.next().transpose()))
             }
             Form::Stream { reader, .. } => guarded(|| reader.next().transpose()),
         };

@@ -1,11 +1,12 @@
-//! The messages of an Arrow stream, each whole, of which none is believed to hold more than its bytes do.
+//! The messages of an Arrow stream or file, each whole, of which none is believed to hold more than its bytes do.
 //!
 //! A compressed buffer begins with the length that it will have; its reader takes memory for as much, and a length that is made up ends
 //! the process. So whatever is not small is unpacked here first, into nothing, and counted.
 
-use std::io::{self, Cursor, Read};
+use std::fs::File;
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 
-use arrow_ipc::{CompressionType, Message, RecordBatch, root_as_message};
+use arrow_ipc::{Block, CompressionType, Message, RecordBatch, root_as_footer, root_as_message};
 
 /// What marks the length of a message, and the end of all.
 const MARK: [u8; 4] = [0xff; 4];
@@ -65,6 +66,65 @@ impl<R: Read> Read for Messages<R> {
         }
         self.next()?;
         self.message.read(buffer)
+    }
+}
+
+/// The messages of a file, which its directory names.
+pub(super) struct Blocks {
+    file: File,
+    batches: Vec<Block>,
+}
+
+impl Blocks {
+    /// Those of the file, the dictionaries looked at. None where there is no directory, which the reader of the file says.
+    pub(super) fn of(mut file: File) -> io::Result<Option<Self>> {
+        let mut end = [0; 10];
+        let length = file.seek(SeekFrom::End(0))?;
+        let Some(place) = length.checked_sub(10) else { return Ok(None) };
+        file.seek(SeekFrom::Start(place))?;
+        file.read_exact(&mut end)?;
+        let bytes = u64::try_from(i32::from_le_bytes([end[0], end[1], end[2], end[3]])).unwrap_or(u64::MAX);
+        let Some(start) = place.checked_sub(bytes) else { return Ok(None) };
+        let mut directory = Vec::new();
+        file.seek(SeekFrom::Start(start))?;
+        file.by_ref().take(bytes).read_to_end(&mut directory)?;
+        let Ok(directory) = root_as_footer(&directory) else { return Ok(None) };
+        let batches = directory.recordBatches().iter().flatten().copied().collect();
+        let dictionaries: Vec<Block> = directory.dictionaries().iter().flatten().copied().collect();
+        let mut blocks = Self { file, batches };
+        dictionaries.iter().try_for_each(|block| blocks.look(block))?;
+        Ok(Some(blocks))
+    }
+
+    /// Looks at a batch before it is read.
+    pub(super) fn check(&mut self, batch: usize) -> io::Result<()> {
+        match self.batches.get(batch).copied() {
+            Some(block) => self.look(&block),
+            None => Ok(()),
+        }
+    }
+
+    fn look(&mut self, block: &Block) -> io::Result<()> {
+        let (Ok(start), Ok(header), Ok(body)) = (
+            u64::try_from(block.offset()),
+            u64::try_from(block.metaDataLength()),
+            u64::try_from(block.bodyLength()),
+        ) else {
+            return Ok(());
+        };
+        let mut bytes = Vec::new();
+        self.file.seek(SeekFrom::Start(start))?;
+        self.file.by_ref().take(header).read_to_end(&mut bytes)?;
+        // The length in front, with the mark before it or without.
+        let prefix = if bytes.starts_with(&MARK) { 8 } else { 4 };
+        let header = bytes.get(prefix..).unwrap_or_default().to_vec();
+        let Ok(said) = root_as_message(&header) else { return Ok(()) };
+        if said.header_as_record_batch().is_some_and(|batch| batch.compression().is_none()) {
+            return Ok(());
+        }
+        bytes.clear();
+        self.file.by_ref().take(body).read_to_end(&mut bytes)?;
+        check(&said, &bytes)
     }
 }
 

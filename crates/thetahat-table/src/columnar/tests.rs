@@ -507,17 +507,23 @@ fn lengths_that_are_made_up_take_no_memory() {
     let batch = batch(&[("y", numbers(vec![1.0; rows])), ("u", numbers((0..rows).map(|row| row as f64)))]);
     for codec in [CompressionType::LZ4_FRAME, CompressionType::ZSTD] {
         let options = IpcWriteOptions::default().try_with_compression(Some(codec)).unwrap();
-        let mut whole = Vec::new();
-        let mut writer = StreamWriter::try_new_with_options(&mut whole, &batch.schema(), options).unwrap();
+        let (mut file, mut stream) = (Vec::new(), Vec::new());
+        let mut writer =
+            FileWriter::try_new_with_options(&mut file, &batch.schema(), options.clone()).unwrap();
         writer.write(&batch).unwrap();
         writer.finish().unwrap();
-        let length = (8 * rows as i64).to_le_bytes();
-        let place = whole.windows(8).position(|bytes| bytes == length).unwrap();
-        for made_up in [1 << 60, 1 << 21, i64::MAX, 8 * rows as i64 + 8, -2] {
-            let mut damaged = whole.clone();
-            damaged[place..place + 8].copy_from_slice(&i64::to_le_bytes(made_up));
-            let message = error(&damaged, &["y"], None);
-            assert!(message.starts_with("it is damaged after 0 rows ("), "{made_up}: {message}");
+        let mut writer = StreamWriter::try_new_with_options(&mut stream, &batch.schema(), options).unwrap();
+        writer.write(&batch).unwrap();
+        writer.finish().unwrap();
+        for whole in [file, stream] {
+            let length = (8 * rows as i64).to_le_bytes();
+            let place = whole.windows(8).position(|bytes| bytes == length).unwrap();
+            for made_up in [1 << 60, 1 << 21, i64::MAX, 8 * rows as i64 + 8, -2] {
+                let mut damaged = whole.clone();
+                damaged[place..place + 8].copy_from_slice(&i64::to_le_bytes(made_up));
+                let message = error(&damaged, &["y"], None);
+                assert!(message.starts_with("it is damaged after 0 rows ("), "{made_up}: {message}");
+            }
         }
     }
 }

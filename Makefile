@@ -1,4 +1,4 @@
-.PHONY: demo check test test-long format lint docs unit rust core chromium arm embedded images python wheel soak soak-track monte-carlo exports bench build-cost
+.PHONY: demo check test test-long format lint docs unit rust core chromium arm embedded images python wheel soak soak-track monte-carlo exports fuzz bench build-cost
 
 # Fit the sample log that the program carries.
 demo:
@@ -11,11 +11,12 @@ check: format lint unit
 # skipped by name, or fails where CI=true.
 test: format lint docs rust embedded python
 
-# What takes long, beside that: the core on its own, images for more processors, endurance, simulated logs and random exports by the score.
-test-long: core images soak soak-track monte-carlo exports
+# What takes long, beside that: the core on its own, images for more processors, endurance, simulated logs, random exports and damaged
+# files by the score.
+test-long: core images soak soak-track monte-carlo exports fuzz
 
 format:
-	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers examples/self_tuning_heater tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
+	@$(call with,rustfmt,fmt,cargo fmt --all --check && for d in benches/peers examples/self_tuning_heater fuzz tests/embedded; do (cd $$d && cargo fmt --check) || exit 1; done)
 
 # They read the Python module too, and need no Python for that.
 lint docs: export PYO3_NO_PYTHON = 1
@@ -64,9 +65,10 @@ python:
 wheel:
 	py/tests/run --release
 
-# The online estimators in single precision, 10^8 steps each.
+# The online estimators in single precision, 10^8 steps each; standard errors where inputs are held, 200 runs of 10^6 samples each.
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+	HELD_RUNS=200 HELD_SAMPLES=1000000 cargo test --locked --release -p thetahat-core --test forgetting held -- --nocapture
 
 # 10^8 rows through a pipe to thetahat track: its memory, and how far it strays from the truth.
 soak-track:
@@ -80,6 +82,11 @@ monte-carlo:
 # Random equations as source code: it compiles, and says what the library does.
 exports:
 	EXPORTS=100 cargo test --locked --workspace --all-features --test end_to_end -- --nocapture whatever_the_equations
+
+# Damaged logs, documents and equations: mutations of the seeds, then a minute of the fuzzer for each where it is there.
+fuzz:
+	FUZZ=20 cargo test --locked --workspace --all-features --test end_to_end -- --nocapture makes_it_panic
+	@if cargo +nightly fuzz --version >/dev/null 2>&1; then fuzz/run 60; else echo "skipped: cargo-fuzz is not installed"; fi
 
 # Our own benches, then the comparison with other packages. Not part of the tests.
 bench:

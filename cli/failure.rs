@@ -129,7 +129,7 @@ impl Failure {
         let remedy = match error.kind() {
             io::ErrorKind::StorageFull => "make room on the disk",
             io::ErrorKind::IsADirectory => "name a file in it",
-            _ => "check the path and its permissions",
+            _ => thetahat_table::remedy(error),
         };
         Self::new(Kind::Io(error.kind()), format!("{}: {what}: {error}; {remedy}", path.display()))
     }

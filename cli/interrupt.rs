@@ -1,7 +1,7 @@
 //! Ctrl-C and SIGTERM: the program ends, and no file is left half written.
 //!
-//! A search that asks for it ends by itself at its next iteration, and a stream with the row at hand. At any other time, and
-//! on the second Ctrl-C, the program ends at once, without the file that it was writing.
+//! A search that asks for it ends by itself at its next iteration, and a stream with the row at hand. At any other time, on the
+//! second Ctrl-C, and where that takes longer than a few seconds, the program ends at once, without the file that it was writing.
 
 use std::fs;
 use std::io;
@@ -27,7 +27,7 @@ const INTERRUPTED: u8 = 130;
 #[cfg(unix)]
 const TERMINATED: u8 = 143;
 
-/// So long a stream has to end by itself.
+/// So long a search or a stream has to end by itself.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Whether a stream has to end. It is asked once a row, so it is apart from the lock.
@@ -79,12 +79,16 @@ pub(crate) fn listen() {
     {
         static LISTENING: std::sync::Once = std::sync::Once::new();
         LISTENING.call_once(|| {
+            let (listens, listening) = std::sync::mpsc::channel();
             // Without a thread SIGTERM ends the program as it ends any other.
-            let _ = thread::Builder::new().spawn(|| {
+            let _ = thread::Builder::new().spawn(move || {
                 if let Ok(mut signals) = Signals::new([SIGTERM]) {
+                    let _ = listens.send(());
                     signals.forever().for_each(|_| asked_by(TERMINATED));
                 }
             });
+            // A signal that comes after this is heard.
+            let _ = listening.recv();
         });
     }
 }
@@ -98,14 +102,17 @@ fn asked_by(code: u8) {
         ENDING.store(true, Ordering::Relaxed);
         if let Some(waker) = &state.waker {
             waker.wake();
-            // It may wait for a reader of its output who does not come.
-            let _ = thread::Builder::new().spawn(move || {
-                thread::sleep(PATIENCE);
-                if self::state().waker.is_some() {
-                    asked_by(code);
-                }
-            });
         }
+        // It may wait for a reader of its output who does not come, or for who writes its log.
+        let _ = thread::Builder::new().spawn(move || {
+            thread::sleep(PATIENCE);
+            let state = self::state();
+            let goes_on = state.asked && (state.searching || state.waker.is_some());
+            drop(state);
+            if goes_on {
+                asked_by(code);
+            }
+        });
         return;
     }
     if let Some(bar) = &state.bar {

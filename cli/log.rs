@@ -188,7 +188,7 @@ pub(crate) fn in_parts<T>(
     choose: impl FnOnce(&Reader) -> Result<(Vec<String>, usize, T), Failure>,
     take: &mut dyn FnMut(&T, Part<'_>) -> Result<(), Failure>,
 ) -> Result<Vec<String>, Failure> {
-    let reader = Reader::open(path, &job.options)?;
+    let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let (names, lags, chosen) = choose(&reader)?;
     let (selection, mut words) = selected(&reader, &file, job, &names)?;
@@ -332,7 +332,7 @@ pub(crate) fn follow(
     start: Option<&str>,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<(Stream, Vec<String>), Failure> {
-    let reader = Reader::open_live(path, &job.options)?;
+    let reader = Reader::open_live(path, &options(job))?;
     let names = choose(reader.names())?;
     let (selection, words) = selected(&reader, &path.display().to_string(), job, &names)?;
     let stream = reader.stream(&selection, whole_lines, start)?;
@@ -366,9 +366,7 @@ fn columns(
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Columns, Failure> {
-    // As much as there is now: other logs may be in memory already.
-    let bound = Some(Bound::now(job.per_value as u64));
-    let reader = Reader::open(path, &Options { bound, ..job.options.clone() })?;
+    let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
     let (selection, mut words) = selected(&reader, &file, job, &names)?;
@@ -384,6 +382,11 @@ fn columns(
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
     let source = Source { file, rows, time: job.clock.column(), start: table.start.take(), resampled: None };
     Ok(Columns { channels, table, source, words })
+}
+
+/// How a log is written, and as much memory as there is now: other logs may be in memory already.
+fn options(job: &LogJob) -> Options {
+    Options { bound: Some(Bound::now(job.per_value as u64)), ..job.options.clone() }
 }
 
 /// Where the named columns are, and the clock of the job; with what the reader should know, in plain words.

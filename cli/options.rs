@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 89] = [
+pub(crate) const OPTIONS: [&str; 90] = [
     "alarm",
     "alpha",
     "alphas",
@@ -56,6 +56,7 @@ pub(crate) const OPTIONS: [&str; 89] = [
     "observer",
     "offset",
     "order",
+    "outliers",
     "past",
     "period",
     "points",

@@ -299,5 +299,14 @@ fn existing(target: &Path) -> io::Result<Option<fs::Metadata>> {
 
 /// An error without the name that a passing file had, which is nobody's business.
 fn plain(error: io::Error) -> io::Error {
-    if error.get_ref().is_some() { error.kind().into() } else { error }
+    if error.get_ref().is_none() {
+        return error;
+    }
+    // The number of the system is left in the text only, in front of the name; many numbers have no kind of their own.
+    let text = error.to_string();
+    let number = text.split_once("(os error ").and_then(|(_, rest)| rest.split_once(')')?.0.parse().ok());
+    match number.map(io::Error::from_raw_os_error) {
+        Some(plain) if plain.kind() == error.kind() => plain,
+        _ => error.kind().into(),
+    }
 }

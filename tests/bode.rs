@@ -165,3 +165,19 @@ fn a_report_that_is_none() {
     assert!(folder.refused("bode nowhere.json", 5).contains("nowhere.json: "));
     assert!(folder.refused("bode log.csv", 3).contains("log.csv: this is not a thetahat report"));
 }
+
+/// The command line makes sense, the report does not.
+#[test]
+fn numbers_near_the_end_of_the_range_are_those_of_the_report() {
+    let folder = Folder::new();
+    for seed in [
+        include_str!("../fuzz/seeds/document/gain_near_the_end.json"),
+        include_str!("../fuzz/seeds/document/kalman_gain_near_the_end.json"),
+    ] {
+        folder.write("model.json", seed);
+        let line = folder.refused("bode model.json", 3);
+        assert!(line.contains("model.json: "), "{line}");
+    }
+    // Whoever names a frequency has named it.
+    folder.refused("bode model.json --frequencies 1..2", 2);
+}

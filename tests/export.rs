@@ -113,6 +113,25 @@ fn models_of_polynomials_say_what_the_library_does() {
         folder.done(&format!("fit dc_motor.csv --time t {orders} --report r.json"));
         goes_round(&folder, "r.json", "dc_motor.csv --time t", &purposes);
     }
+    // Numbers that are missing are counted.
+    holes(&folder);
+    goes_round(&folder, "r.json", "holes.csv --time t", &["predictor"]);
+    assert!(folder.read("model_test.c").contains("if (missing != 2U)"));
+}
+
+/// The log of the motor, of which one row has no output, and one no input.
+fn holes(folder: &Folder) {
+    let whole = folder.read("dc_motor.csv");
+    let log = whole.lines().enumerate().map(|(row, line)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        match row {
+            100 => cells[2] = "",
+            200 => cells[1] = "",
+            _ => {}
+        }
+        cells.join(",") + "\n"
+    });
+    folder.write("holes.csv", log.collect::<String>());
 }
 
 #[test]
@@ -301,10 +320,14 @@ int main(void)
         const double given[2][1] = {{k == 9 ? INFINITY : 1.0}, {k == 9 ? NAN : 1.0}};
         const double measured[2][1] = {{k == 19 ? -INFINITY : 2.0}, {k == 19 ? NAN : 2.0}};
         double y[2][1];
-        model_predict(&one, given[0], y[0]);
-        model_predict(&other, given[1], y[1]);
-        model_update(&one, measured[0]);
-        model_update(&other, measured[1]);
+        unsigned int missing = model_predict(&one, given[0], y[0]);
+        if (model_predict(&other, given[1], y[1]) != missing || missing != (k == 9 ? 1U : 0U)) {
+            return 2;
+        }
+        missing = model_update(&one, measured[0]);
+        if (model_update(&other, measured[1]) != missing || missing != (k == 19 ? 1U : 0U)) {
+            return 3;
+        }
         if (!isfinite(y[0][0]) || !(y[0][0] >= y[1][0] && y[0][0] <= y[1][0])) {
             return 1;
         }
@@ -332,6 +355,115 @@ fn infinity_is_a_missing_number_and_a_compiler_that_does_not_see_it_is_refused()
     }
 }
 
+/// What an exported observer holds after each row of a log: the innovations, and the NIS.
+fn innovations_of_an_observer(folder: &Folder, rows: &[Vec<f64>], language: &str) -> Vec<Vec<f64>> {
+    let numbers = |row: &[f64]| row.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ");
+    let table = |open: char, close: char| -> String {
+        rows.iter()
+            .map(|row| {
+                format!(
+                    "    {open}{open}{}{close}, {open}{}{close}{close},\n",
+                    numbers(&row[..1]),
+                    numbers(&row[1..])
+                )
+            })
+            .collect()
+    };
+    let (count, outputs) = (rows.len(), rows[0].len() - 1);
+    let printed = if language == "c" {
+        let text = format!(
+            "#include \"model.h\"\n#include <stdio.h>\n\
+             static const struct {{ double u[1]; double y[{outputs}]; }} rows[{count}] = {{\n{}}};\n\
+             int main(void)\n{{\n    model_state state;\n    double x[2];\n    model_init(&state);\n    \
+             for (int k = 0; k < {count}; k += 1) {{\n        (void)model_observe(&state, rows[k].u, rows[k].y, x);\n        \
+             for (int i = 0; i < {outputs}; i += 1) {{\n            printf(\"%.17g \", state.innovation[i]);\n        }}\n        \
+             printf(\"%.17g\\n\", state.nis[0]);\n    }}\n    return 0;\n}}\n",
+            table('{', '}')
+        );
+        folder.write("print.c", text);
+        let mut command = Command::new("gcc");
+        command.current_dir(folder.path(".")).args(STRICT).args([
+            "model.c",
+            "print.c",
+            "-lm",
+            "-o",
+            "print_of_c",
+        ]);
+        done(&mut command);
+        done(&mut Command::new(folder.path("print_of_c")))
+    } else {
+        let text = format!(
+            "#[path = \"model.rs\"]\nmod model;\nfn main() {{\n    let mut model = model::Model::new();\n    \
+             let rows: [([f64; 1], [f64; {outputs}]); {count}] = [\n{}    ];\n    for (u, y) in &rows {{\n        \
+             let (_state, _missing) = model.observe(u, y);\n        \
+             model.innovation.iter().for_each(|e| print!(\"{{e:?}} \"));\n        println!(\"{{:?}}\", model.nis[0]);\n    }}\n}}\n",
+            table('[', ']').replace("[[", "([").replace("]],", "]),")
+        );
+        folder.write("print.rs", text);
+        let mut command = Command::new("rustc");
+        command.current_dir(folder.path(".")).args([
+            "--edition=2024",
+            "-A",
+            "dead_code",
+            "print.rs",
+            "-o",
+            "print_of_rust",
+        ]);
+        done(&mut command);
+        done(&mut Command::new(folder.path("print_of_rust")))
+    };
+    let text = String::from_utf8(printed.stdout).expect("text");
+    let line = |line: &str| line.split(' ').map(|cell| cell.parse().expect("a number")).collect();
+    text.lines().map(line).collect()
+}
+
+#[test]
+fn observers_hold_the_innovations_of_filter() {
+    let folder = Folder::new();
+    folder.write("motor.csv", include_str!("data/dc_motor.csv"));
+    folder.write("spring.csv", include_str!("data/mass_spring_damper.csv"));
+    folder.write("spring.toml", include_str!("data/mass_spring_damper.toml"));
+    for (log, fit, channels, initial) in [
+        ("motor.csv", "-u u -y i,speed --order 2", &["u", "i", "speed"][..], "--initial zero"),
+        ("motor.csv", "-u u -y speed --model ss --order 2", &["u", "speed"], "--initial zero"),
+        ("spring.csv", "--grey spring.toml", &["force", "position"], ""),
+    ] {
+        folder.done(&format!("fit {log} --time t {fit} --report r.json"));
+        let filtered = folder.done(&format!("filter r.json {log} --time t {initial}")).stdout;
+        let filtered: Vec<serde_json::Value> =
+            filtered.lines().take(200).map(|line| serde_json::from_str(line).expect("a row")).collect();
+        let text = folder.read(log);
+        let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<&str>>());
+        let header = lines.next().expect("a header");
+        let places =
+            channels.iter().map(|name| header.iter().position(|own| own == name).expect("a channel"));
+        let places: Vec<usize> = places.collect();
+        let row =
+            |cells: Vec<&str>| places.iter().map(|place| cells[*place].parse().expect("a number")).collect();
+        let rows: Vec<Vec<f64>> = lines.take(200).map(row).collect();
+        for language in ["c", "rust"] {
+            if language == "c" && !has("gcc") {
+                continue;
+            }
+            folder
+                .done(&format!("export r.json --to {language} --what observer --precision f64 --name model"));
+            let held = innovations_of_an_observer(&folder, &rows, language);
+            assert_eq!(held.len(), 200);
+            for (number, (held, filtered)) in held.iter().zip(&filtered).enumerate() {
+                let names = channels[1..].iter().map(|name| format!("innovation_{name}"));
+                for (own, name) in held.iter().zip(names.chain(["nis".to_owned()])) {
+                    let expected = filtered[&name].as_f64().expect("a number");
+                    let apart = (own - expected).abs();
+                    assert!(
+                        apart <= 1e-7 * expected.abs().max(1.0),
+                        "{fit}, {language}, {number}: {name} {own} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn nearest_neighbours_are_for_rust_alone() {
     let folder = motor();
@@ -347,18 +479,7 @@ fn nearest_neighbours_are_for_rust_alone() {
 #[test]
 fn estimators_go_on_from_the_fit() {
     let folder = motor();
-    // Along rows of which some have no output, and some no input.
-    let whole = folder.read("dc_motor.csv");
-    let log = whole.lines().enumerate().map(|(row, line)| {
-        let mut cells: Vec<&str> = line.split(',').collect();
-        match row {
-            100 => cells[2] = "",
-            200 => cells[1] = "",
-            _ => {}
-        }
-        cells.join(",") + "\n"
-    });
-    folder.write("holes.csv", log.collect::<String>());
+    holes(&folder);
     for orders in [
         "-u u -y y --na 2 --nb 2 --nk 3",
         "-u u -y y --na 2 --nb 2 --nk 0",
@@ -509,10 +630,14 @@ fn controllers_control() {
          y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0);\n        heater.applied(u);\n    }\n    assert!((y - 25.0_f32).abs() < 0.01);\n}\n",
     );
     rustc(&folder, "heater");
+    // With a log there is a test vector.
+    goes_round(&folder, "c.json", "log.csv --sample-time 1", &["controller"]);
+    assert!(folder.read("model.csv").starts_with("u1,y1,set_point1,expected1\n"));
+    let message = folder.refused("export c.json log.csv --sample-time 2 --to c --what controller", 3);
+    assert!(message.contains("the controller's 1 s"), "{message}");
     for (line, words) in [
         ("c.json --to c --what predictor", "a controller is exported as no predictor; take controller"),
         ("r.json --to c --what controller", "a model is no controller"),
-        ("c.json log.csv --to c --what controller", "leave the log out"),
     ] {
         let message = folder.refused(&format!("export {line}"), 2);
         assert!(message.contains(words), "{message}");

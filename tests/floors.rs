@@ -25,7 +25,7 @@ const CORE: House = House {
         &["forgetting", "ud"],
         &["dim", "stability"],
         &["basis", "innovation", "snapshot", "solution"],
-        &["covariance", "detect", "lags", "least_squares"],
+        &["covariance", "detect", "lags", "least_squares", "outliers"],
         &["rls", "state_space", "windowed"],
         &["arx", "augmented", "differentiated", "gradient", "kalman"],
         &["armax", "ekf", "luenberger", "nonlinear_arx", "output_error", "schedule", "vector_arx"],
@@ -93,7 +93,7 @@ const COMMAND_LINE: House = House {
 const PYTHON: House = House {
     source: "py/src",
     floors: &[
-        &["error"],
+        &["error", "in_use"],
         &["journal", "work"],
         &["array"],
         &["grey_box", "log"],

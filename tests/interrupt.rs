@@ -216,3 +216,23 @@ fn a_run_over_many_logs_goes_on_after_it_was_interrupted() {
     let run = folder.run(&line);
     assert!(run.stdout.contains("5 rows, 0 of them without a failure; 4 as in an earlier run"), "{run:?}");
 }
+
+/// Nobody writes to the pipe: the run waits for its first byte until it is told to end.
+#[test]
+fn one_signal_ends_many_logs_whatever_they_wait_for() {
+    let folder = Folder::with_log(plain_log());
+    let made = Command::new("mkfifo").arg(folder.path("pipe")).status().expect("it is there");
+    assert!(made.success());
+    let line = "fit --each log.csv pipe --na 1 --nb 1 --table t.csv --reports out --threads 1";
+    let child = started(folder.command(line));
+    let begun = Instant::now();
+    while !folder.path("out/log.json").exists() {
+        assert!(begun.elapsed() < HANGS);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    kill_process(Pid::from_child(&child), Signal::TERM).expect("the program runs");
+    let run = ended(child);
+    assert_eq!((run.code, run.stdout.as_str()), (143, ""));
+    assert!(run.stderr.ends_with("interrupted\n"), "{}", run.stderr);
+    assert!(!folder.path("t.csv").exists());
+}

@@ -28,6 +28,8 @@ mod fit_reference;
 mod floors;
 mod focus;
 mod forecast;
+#[cfg(feature = "columnar")]
+mod fuzz;
 mod harness;
 mod html;
 mod identities;

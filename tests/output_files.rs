@@ -208,6 +208,21 @@ mod linux {
         }
     }
 
+    /// Three are open, and what listens for signals has two before the log is read.
+    #[test]
+    fn too_many_open_files_are_told_as_such() {
+        let folder = Folder::with_log(plain_log());
+        let inner = folder.command(&format!("{FIT} --report model.json"));
+        let mut command = Command::new("sh");
+        command.arg("-c").arg("ulimit -n 5; exec \"$0\" \"$@\"").arg(inner.get_program());
+        command.args(inner.get_args()).current_dir(folder.path(""));
+        let run = Run::of(command);
+        assert_eq!(run.code, 5, "{}", run.stderr);
+        assert!(run.refusal().contains("Too many open files"), "{}", run.stderr);
+        assert!(run.refusal().ends_with("raise the limit of open files (`ulimit -n`)"), "{}", run.stderr);
+        assert_eq!(folder.names(), ["log.csv"]);
+    }
+
     #[test]
     fn what_cannot_be_said_changes_no_exit_code() {
         let folder = Folder::with_log(plain_log());

@@ -83,6 +83,32 @@ fn without_forgetting_it_ends_at_the_batch_fit() {
 }
 
 #[test]
+fn spikes_do_not_spoil_the_model_where_a_rule_for_them_is_asked_for() {
+    let [u1, u2, mut y] = two_inputs(2000);
+    for k in (150..2000).step_by(100) {
+        y[k] += 30.0;
+    }
+    let folder = Folder::with_log(csv(&[("u1", &u1), ("u2", &u2), ("y", &y)]));
+    let truth = [-1.2, 0.5, 1.0, 0.4, -0.7];
+    let farthest = |line: &Value| {
+        distance(&["a1", "a2", "b1_1", "b1_2", "b2_2"].map(|name| number(line, &format!("/{name}"))), &truth)
+    };
+    for (rule, action, least, most) in
+        [("used", "updated", 0.5, 9.0), ("huber", "bounded", 0.0, 0.1), ("gate:25:20", "gated", 0.0, 0.1)]
+    {
+        let lines = tracked(&folder, &format!("log.csv --na 2 --nb 2,1 --nk 1,2 --outliers {rule}"));
+        let worst = (500..2000).map(|row| farthest(&lines[row])).fold(0.0, f64::max);
+        assert!((least..most).contains(&worst), "{rule}: {worst}");
+        for k in (550..2000).step_by(100) {
+            assert_eq!(lines[k]["action"], action, "{rule}, row {}", k + 1);
+            assert!(number(&lines[k], "/nis") > 25.0);
+        }
+    }
+    let refusal = folder.refused("track log.csv --na 2 --nb 2,1 --outliers huber:0.1", 2);
+    assert!(refusal.contains("--outliers: 'huber:0.1' is no rule; write used, huber:THRESHOLD"), "{refusal}");
+}
+
+#[test]
 fn a_warm_start_goes_on_from_a_fit() {
     let Experiment { u, y } = Experiment::new(3000);
     let folder = Folder::with_log(csv(&[("u", &u[..2000]), ("y", &y[..2000])]));

@@ -97,6 +97,11 @@ pub(crate) struct TrackArguments {
     /// Do not adapt where the innovation is smaller than this, in units of the output
     #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
     pub(crate) dead_zone: Option<f64>,
+    /// What becomes of rows whose innovations are far larger than the noise makes them: used; huber:THRESHOLD (one of more than
+    /// THRESHOLD standard deviations corrects as one of so many); gate:NIS:RELEASE (above NIS, the square of that, it corrects nothing;
+    /// after RELEASE in a row the next ones do). huber is huber:3, gate is gate:25:20 [default: used]
+    #[arg(long, value_name = "HOW", help_heading = "Adaptation")]
+    pub(crate) outliers: Option<String>,
 
     /// Add to each row a forecast of the output this many rows later, inputs held at their last value
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Watch")]

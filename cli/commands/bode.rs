@@ -29,7 +29,12 @@ pub(crate) fn bode(arguments: &BodeArguments, line: &str) -> Result<(), Failure>
         let found = (model.frequency_response(&[low, high]))
             .and_then(|_| logarithmic_frequencies(low, high, arguments.points as usize))
             .and_then(|frequencies| model.frequency_response(&frequencies));
-        Ok((&model.output().name, found.map_err(|error| Failure::option(&error))?))
+        let failed = |error| match asked {
+            Some(_) => Failure::option(&error),
+            // The frequencies are those of the report.
+            None => Failure::data(format!("{}: {error}", report.display())),
+        };
+        Ok((&model.output().name, found.map_err(failed)?))
     });
     let responses = responses.collect::<Result<Vec<_>, Failure>>()?;
     let several = models.len() > 1;

@@ -2,10 +2,12 @@
 
 use std::fs;
 use std::path::Path;
+use std::slice;
 
 use thetahat::control::Control;
+use thetahat::data::Log;
 use thetahat::export::{Exported, ExportedFile, export as exported, export_controller};
-use thetahat::model::Model;
+use thetahat::model::Signal;
 use thetahat::{Document, is_document};
 
 use super::stored;
@@ -26,39 +28,48 @@ pub(crate) fn export(arguments: &ExportArguments) -> Result<(), Failure> {
         return Err(Failure::usage("the report and the log cannot both come from standard input"));
     }
     let text = stored::text(path)?;
-    if is_document::<Control>(&text) {
-        return controller(arguments, &text);
-    }
-    let report = stored::report_of(path, &text)?;
-    // What cannot be exported is refused before a log is read.
-    let plain = exported(&report, &plan, None)
-        .map_err(|error| Failure::about(&error, |_| path.display().to_string()))?;
-    let Exported { files, warnings } = match &arguments.path {
-        None => plain,
-        Some(log_path) => {
-            let Loaded { log, source, words } = load(log_path, &job, &report.model)?;
-            words.iter().for_each(|word| warn(word));
-            exported(&report, &plan, Some((&log, &asked))).map_err(log::failure(&[source]))?
-        }
+    let (Exported { files, warnings }, what) = if is_document::<Control>(&text) {
+        let document = Control::from_json(&text)
+            .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+        let clocks = Clocks { sample_time: Some(document.sample_time), any: false };
+        let (inputs, outputs) = (slice::from_ref(&document.input), slice::from_ref(&document.output));
+        let made = made(arguments, &job, (clocks, inputs, outputs), |log| {
+            export_controller(&document, &plan, log.map(|log| (log, asked.as_slice())))
+        })?;
+        (made, document.model)
+    } else {
+        let report = stored::report_of(path, &text)?;
+        let model = &report.model;
+        let signals = (Clocks::from(model), model.inputs(), model.outputs());
+        let made = made(arguments, &job, signals, |log| {
+            exported(&report, &plan, log.map(|log| (log, asked.as_slice())))
+        })?;
+        (made, model.name())
     };
     write(arguments, &files)?;
     warnings.iter().for_each(|warning| warn(warning));
-    say(&format!("{} of {}", plan.purpose.word(), report.model.name()), &files);
+    say(&format!("{} of {what}", plan.purpose.word()), &files);
     Ok(())
 }
 
-/// The controller of a document.
-fn controller(arguments: &ExportArguments, text: &str) -> Result<(), Failure> {
-    let shown = arguments.report.display();
-    if arguments.path.is_some() {
-        return Err(Failure::usage("a controller has no test vector: leave the log out"));
-    }
-    let document = Control::from_json(text).map_err(|error| Failure::data(format!("{shown}: {error}")))?;
-    let exported = export_controller(&document, &arguments.plan());
-    let Exported { files, .. } = exported.map_err(|error| Failure::about(&error, |_| shown.to_string()))?;
-    write(arguments, &files)?;
-    say(&format!("controller of {}", document.model), &files);
-    Ok(())
+/// What `export` makes with the log that was given. What cannot be exported is refused before one is read.
+fn made(
+    arguments: &ExportArguments,
+    job: &LogJob,
+    (clocks, inputs, outputs): (Clocks, &[Signal], &[Signal]),
+    export: impl Fn(Option<&Log>) -> Result<Exported, thetahat::Error>,
+) -> Result<Exported, Failure> {
+    let plain =
+        export(None).map_err(|error| Failure::about(&error, |_| arguments.report.display().to_string()))?;
+    let Some(path) = &arguments.path else { return Ok(plain) };
+    // The channels that the log has.
+    let Loaded { log, source, words } = log::load(path, job, clocks, |header| {
+        let outputs = outputs.iter().map(|output| output.name.clone());
+        let inputs = inputs.iter().map(|input| input.name.clone());
+        Ok(inputs.chain(outputs.filter(|name| header.contains(name))).collect())
+    })?;
+    words.iter().for_each(|word| warn(word));
+    export(Some(&log)).map_err(log::failure(&[source]))
 }
 
 fn write(arguments: &ExportArguments, files: &[ExportedFile]) -> Result<(), Failure> {
@@ -72,13 +83,4 @@ fn write(arguments: &ExportArguments, files: &[ExportedFile]) -> Result<(), Fail
 fn say(what: &str, files: &[ExportedFile]) {
     let names: Vec<&str> = files.iter().map(|file| file.name.as_str()).collect();
     tell(&format!("{what}: {}", names.join(", ")));
-}
-
-/// The channels of a model that a log has.
-fn load(path: &Path, job: &LogJob, model: &Model) -> Result<Loaded, Failure> {
-    log::load(path, job, Clocks::from(model), |header| {
-        let inputs = model.inputs().iter().map(|input| input.name.clone());
-        let outputs = model.outputs().iter().map(|output| output.name.clone());
-        Ok(inputs.chain(outputs.filter(|name| header.contains(name))).collect())
-    })
 }

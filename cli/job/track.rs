@@ -84,6 +84,12 @@ impl TrackJob {
                 .transpose()?
                 .unwrap_or_default(),
             dead_zone: arguments.dead_zone.unwrap_or(0.0),
+            outliers: arguments
+                .outliers
+                .as_deref()
+                .map(|text| parsed("--outliers", text))
+                .transpose()?
+                .unwrap_or_default(),
             constant: arguments.constant,
             alarm_interval: arguments.alarm,
             ..TrackPlan::default()

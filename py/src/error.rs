@@ -33,9 +33,9 @@ pub(crate) fn online(py: Python<'_>, error: thetahat_core::Error) -> PyErr {
     stepper(py, error, error.to_string())
 }
 
-/// What they say of one row of a run, from 0.
+/// What they say of one row of a run, given from 0. Messages count rows from 1, as those of logs do.
 pub(crate) fn online_at(py: Python<'_>, row: usize, error: thetahat_core::Error) -> PyErr {
-    stepper(py, error, format!("row {row}: {error}"))
+    stepper(py, error, format!("row {}: {error}", row + 1))
 }
 
 fn stepper(py: Python<'_>, error: thetahat_core::Error, message: String) -> PyErr {

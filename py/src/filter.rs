@@ -161,6 +161,7 @@ fn numbers<'a>(
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl StateFilter {
     /// A filter before its first row: the word of the estimator or none; of an observer its poles, real and imaginary parts, or
     /// its gain.

@@ -2,8 +2,7 @@
 //!
 //! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half, `online` the steppers,
 //! `filter` and `track` the steppers behind logs. `journal` is what has been done with which of many logs. `array` reads and makes
-//! NumPy arrays, `error` is
-//! the one map of errors, `work` runs what takes long.
+//! NumPy arrays, `error` is the one map of errors, `in_use` what is said of an object that another call uses, `work` runs what takes long.
 
 mod array;
 mod design;
@@ -12,6 +11,7 @@ mod evaluation;
 mod experiments;
 mod filter;
 mod grey_box;
+mod in_use;
 mod journal;
 mod log;
 mod model;

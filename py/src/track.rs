@@ -40,6 +40,7 @@ const COLUMNS: [&str; 8] =
     ["predicted", "errors", "variances", "nis", "excitation", "forecasts", "parameters", "standard_errors"];
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl Tracker {
     /// A tracker with the options of `thetahat track` for these channels, from nothing or from a fitted model.
     #[new]
@@ -98,7 +99,7 @@ impl Tracker {
             let names = self.tracking.inputs().iter().chain(self.tracking.outputs());
             for (value, name) in inputs.iter().chain(outputs).zip(names) {
                 if value.is_infinite() {
-                    let message = format!("row {at}: '{name}' is infinite; NaN is a missing sample");
+                    let message = format!("row {}: '{name}' is infinite; NaN is a missing sample", at + 1);
                     return Err(PyValueError::new_err(message));
                 }
             }

@@ -130,12 +130,12 @@ def test_it_pickles_and_goes_on_to_the_bit() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (([1.0, math.inf], [1.0, 1.0]), "row 1: errors is infinite"),
+        (([1.0, math.inf], [1.0, 1.0]), "row 2: errors is infinite"),
         (([], []), "errors: expected at least one entry"),
         (([1.0, 2.0], [1.0]), r"variances: expected 2 entries, found shape \(1,\)"),
         ((np.ones((3, 2)), np.ones((3, 2))), r"errors: expected shape \(any, 1\), found shape \(3, 2\)"),
         (([1.0], [1.0], [1.0, 2.0]), "nis: expected 1 entry"),
-        (([1.0], [1.0], [math.inf]), "row 0: nis is infinite"),
+        (([1.0], [1.0], [math.inf]), "row 1: nis is infinite"),
     ],
 )
 def test_bad_arrays_change_nothing(arguments: tuple[Any, ...], message: str) -> None:

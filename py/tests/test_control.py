@@ -137,6 +137,25 @@ def test_a_copy_goes_on_alike_and_a_probe_excites() -> None:
     own.applied(0.0)
 
 
+def test_a_tuner_that_is_not_trusted_says_why() -> None:
+    own = tuner(gain_sign=-1, fallback=0.5)
+    run = th.closed_loop(own, plant_of([-1.5, 0.56], [0, 0.04, 0.02], 0.005), np.ones(600))
+    assert own.state == "distrusted" and own.distrust == "sign of the gain"
+    np.testing.assert_allclose(np.abs(run.u[-100:] - 0.5), 0.1)
+    assert own.design_age == 600 and np.abs(own.innovation.error) < 0.1
+    assert pickle.loads(pickle.dumps(own)).distrust == own.distrust
+    own.set_fallback("last good")
+    own.set_gain_sign(1)
+    run = th.closed_loop(own, plant_of([-1.5, 0.56], [0, 0.04, 0.02], 0.005), np.ones(1000))
+    assert own.distrust is None and abs(run.y[-20:] - 1).max() < 0.1
+    own.trust()
+    for wrong in ("safe", None, math.nan):
+        with pytest.raises(ValueError, match="fallback"):
+            own.set_fallback(wrong)
+    with pytest.raises(ValueError, match="gain_sign"):
+        own.set_gain_sign(2)
+
+
 def test_a_tuner_learns_noise_that_is_not_white() -> None:
     random, found = np.random.default_rng(5), {}
     e = 0.05 * random.standard_normal(4000)

@@ -16,7 +16,7 @@ def test_files_are_those_of_the_command_line(tmp_path: Path) -> None:
     files = model.export("rust", "simulator", name="motor", folder=tmp_path / "firmware")
     assert list(files) == ["motor.rs"]
     assert (tmp_path / "firmware" / "motor.rs").read_text(encoding="utf-8") == files["motor.rs"]
-    assert "pub fn step(&mut self, u: &[f32; 1]) -> [f32; 1]" in files["motor.rs"]
+    assert "pub fn step(&mut self, u: &[f32; 1]) -> ([f32; 1], usize)" in files["motor.rs"]
     assert list(model.export("c", "predictor")) == ["model_predictor.h", "model_predictor.c"]
 
 

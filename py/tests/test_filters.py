@@ -195,7 +195,7 @@ def test_every_size_gives_the_same_bits(n: int, m: int, correlated: bool) -> Non
     before = pickle.dumps(run)
     assert pickle.dumps(loop) == before
     measurements[7, 0] = np.inf
-    with pytest.raises(ValueError, match="^row 7: measurement is infinite"):
+    with pytest.raises(ValueError, match="^row 8: measurement is infinite"):
         run.run(transition, observation, measurements, inputs=inputs, cross_covariance=cross)
     assert pickle.dumps(run) == before
 
@@ -303,7 +303,7 @@ def test_a_function_that_fails_changes_nothing(
         error = ValueError
     with pytest.raises(error, match=message):
         filter.predict(transition)
-    with pytest.raises(error, match=message if error is Refused else "^row 0: "):
+    with pytest.raises(error, match=message if error is Refused else "^row 1: "):
         filter.run(transition, POSITION, [1.0, 2.0])
     with pytest.raises(error):
         filter.smooth(transition, POSITION, [1.0, 2.0])
@@ -327,7 +327,7 @@ def test_a_failed_step_changes_nothing_and_a_run_names_the_row() -> None:
     filter = KalmanFilter([0.0, 0.0], np.eye(2))
     before = pickle.dumps(filter)
     calls: list[tuple[Callable[[], object], str]] = [
-        (lambda: filter.run(MOTION, POSITION, [1.0] * 7 + [np.inf]), "^row 7: measurement is infinite"),
+        (lambda: filter.run(MOTION, POSITION, [1.0] * 7 + [np.inf]), "^row 8: measurement is infinite"),
         (lambda: filter.run(MOTION, POSITION, np.ones((5, 2))), r"measurements: expected shape \(any, 1\)"),
         (lambda: filter.run(MOTION, POSITION, []), "measurements: expected at least one"),
         (lambda: filter.run(MOTION, POSITION, [1.0], inputs=[1.0]), "inputs: expected None"),

@@ -267,7 +267,7 @@ def test_a_failed_run_names_the_row_and_changes_nothing() -> None:
     y[17] = np.inf
     estimator = RecursiveLeastSquares(3)
     before = state(estimator)
-    with pytest.raises(ValueError, match="^row 17: y is infinite"):
+    with pytest.raises(ValueError, match="^row 18: y is infinite"):
         estimator.run(phi, y)
     with pytest.raises(ValueError, match="^y: expected 200 entries"):
         estimator.run(phi, y[1:])
@@ -276,7 +276,7 @@ def test_a_failed_run_names_the_row_and_changes_nothing() -> None:
     u[5] = np.inf
     arx = RecursiveArx(1, 1)
     before = state(arx)
-    with pytest.raises(ValueError, match="^row 5: u is infinite"):
+    with pytest.raises(ValueError, match="^row 6: u is infinite"):
         arx.run(y, u=u)
     assert state(arx) == before
 
@@ -509,6 +509,54 @@ def test_start_and_dead_zone_and_adaptation_show_in_the_action() -> None:
     warm.advance()
     for thing in (estimator, warm, estimator.forgetting, warm.update([1.0, 1.0], 1.0)):
         assert "\n" not in repr(thing)
+
+
+@pytest.mark.parametrize("rule", [{}, {"huber": 3.0}, {"gate": 25.0, "release": 20}])
+@pytest.mark.parametrize(
+    ("make", "b0"),
+    [
+        (lambda **rule: RecursiveArx(1, 1, output_scale=5.0, **rule), 1),
+        (lambda **rule: RecursiveArmax(1, 1, 1, output_scale=5.0, noise_scale=0.1, **rule), 1),
+        (lambda **rule: th.RecursiveOutputError(1, 1, output_scale=5.0, **rule), 1),
+        (lambda **rule: th.RecursiveNarx(1, 1, degree=1, **rule), -1),
+        (lambda **rule: th.RecursiveVectorArx(1, 1, 1, output_scales=5.0, **rule), 1),
+    ],
+)
+def test_a_rule_for_outliers_keeps_spikes_out(make: Callable[..., Any], b0: int, rule: dict[str, Any]) -> None:
+    rng = np.random.default_rng(3)
+    u, y = np.sign(rng.normal(size=1500)), np.zeros(1500)
+    for k in range(1, 1500):
+        y[k] = 0.8 * y[k - 1] + u[k - 1] + 0.1 * rng.normal()
+    y[200::100] += 50.0
+    model = make(**rule)
+    vector = isinstance(model, th.RecursiveVectorArx)
+    trajectory = model.run(y[:, None] if vector else y, u=u)
+    gain = trajectory.parameters.reshape(1500, -1)[:, b0]
+    spikes = trajectory.actions[500::100]
+    if not rule:
+        assert set(spikes) <= {"updated", "projected"}
+    else:
+        assert set(spikes) == {"bounded" if "huber" in rule else "gated"}
+        assert np.abs(gain[500:] - 1.0).max() < 0.15
+    assert pickle.loads(pickle.dumps(model)).outliers_in_a_row == model.outliers_in_a_row
+
+
+@pytest.mark.parametrize(
+    ("rule", "message"),
+    [
+        ({"huber": 0.5}, "huber: expected a number of 1 or more"),
+        ({"gate": float("nan")}, "gate: expected a number of 1 or more"),
+        ({"huber": 3.0, "gate": 25.0}, "huber: expected inf, as a gate is given"),
+        ({"release": 3}, "release: expected 0, as there is no gate"),
+        ({"gate": 25.0, "release": 65536}, "release"),
+    ],
+)
+def test_rules_for_outliers_that_are_none(rule: dict[str, Any], message: str) -> None:
+    for make in (RecursiveLeastSquares, lambda n, **rule: RecursiveArx(n, 1, **rule)):
+        with pytest.raises(ValueError, match=message):
+            make(1, **rule)
+    with pytest.raises(ValueError, match="outliers: .*Instruments|outliers"):
+        th.RecursiveOutputError(1, 1, method="instruments", huber=3.0)
 
 
 def test_two_threads_run_two_estimators_at_once() -> None:

@@ -276,8 +276,8 @@ def test_it_pickles_and_copies_wherever_it_stands() -> None:
     ("data", "options", "error", "message"),
     [
         ([], {"u": []}, ValueError, "data: there are no rows"),
-        ([1.0, 2.0, np.inf], {"u": [1.0, 2.0, 3.0]}, ValueError, "row 2: 'y' is infinite; NaN is a missing sample"),
-        ([1.0, 2.0], {"u": [1.0, -np.inf]}, ValueError, "row 1: 'u' is infinite"),
+        ([1.0, 2.0, np.inf], {"u": [1.0, 2.0, 3.0]}, ValueError, "row 3: 'y' is infinite; NaN is a missing sample"),
+        ([1.0, 2.0], {"u": [1.0, -np.inf]}, ValueError, "row 2: 'u' is infinite"),
         ([1.0, 2.0], {}, ValueError, r"u: the model has inputs \(u\)"),
         ([1.0, 2.0], {"u": [1.0]}, ValueError, "u: expected 2 rows as in data, found 1"),
         (np.ones((2, 2)), {"u": [1.0, 2.0]}, ValueError, r"data: expected shape \(rows,\) or \(rows, 1\)"),
@@ -303,12 +303,12 @@ def test_bad_rows_change_nothing(data: Any, options: dict[str, Any], error: type
 def test_bad_single_rows_change_nothing() -> None:
     fresh = th.Tracker(1, 1)
     before = fresh.state()
-    with pytest.raises(ValueError, match="row 1: 'y' is infinite"):
+    with pytest.raises(ValueError, match="row 2: 'y' is infinite"):
         fresh.run([1.0, np.inf], u=[1.0, 1.0], time=[0.0, 1.0])
     assert fresh.state() == before
     cases: list[tuple[tuple[Any, ...], dict[str, Any], type[Exception], str]] = [
-        ((np.inf, 1.0), {}, ValueError, "row 0: 'y' is infinite"),
-        ((1.0, np.inf), {}, ValueError, "row 0: 'u' is infinite"),
+        ((np.inf, 1.0), {}, ValueError, "row 1: 'y' is infinite"),
+        ((1.0, np.inf), {}, ValueError, "row 1: 'u' is infinite"),
         ((1.0,), {}, ValueError, "u: expected 1 numbers, found 0"),
         ((1.0, [1.0, 2.0]), {}, ValueError, "u: expected 1 numbers, found 2"),
         (([1.0, 2.0], 1.0), {}, ValueError, r"y: expected a number, found shape \(2,\)"),

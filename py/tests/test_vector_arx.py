@@ -98,7 +98,7 @@ def test_what_is_wrong_is_refused_and_changes_nothing() -> None:
         model.log_row(y[0], u=[1.0])
     bad = y.copy()
     bad[7, 0] = np.inf
-    with pytest.raises(ValueError, match="row 7"):
+    with pytest.raises(ValueError, match="row 8"):
         model.run(bad, u=u)
     with pytest.raises(ValueError, match="future_inputs"):
         model.predict()

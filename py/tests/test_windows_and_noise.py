@@ -89,7 +89,7 @@ def test_a_bad_sample_leaves_the_window_as_it_was() -> None:
     for phi, y in (([1.0, math.inf], 1.0), ([1.0, 1.0], math.inf), ([1.0], 1.0), ([1e300, 1.0], 1.0)):
         with pytest.raises(ValueError, match="phi|y is|regressor"):
             windowed.update(phi, y)
-    with pytest.raises(ValueError, match="row 1"):
+    with pytest.raises(ValueError, match="row 2"):
         windowed.run([[1.0, 1.0], [math.inf, 1.0]], [1.0, 1.0])
     assert windowed.update([1.0, math.nan], 1.0).action == "missing"
     assert pickle.dumps(windowed) == before

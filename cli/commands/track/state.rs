@@ -222,6 +222,7 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
         add("--start", plan.start.to_string());
         add("--horizon", job.horizon.map_or_else(String::new, |rows| rows.to_string()));
         add("--dead-zone", plan.dead_zone.to_string());
+        add("--outliers", plan.outliers.to_string());
         let several = trackers.get(..channels.outputs.len()).unwrap_or_default();
         let each =
             |numbers: &dyn Fn(&Tracker) -> String| several.iter().map(numbers).collect::<Vec<_>>().join(";");

@@ -10,18 +10,18 @@
 // static thetahat_word memory[THETAHAT_RLS_WORDS(4)];
 #define THETAHAT_WORDS(numbers, bytes) \
     (((numbers) * sizeof(thetahat_number) + (bytes) + sizeof(thetahat_word) - 1) / sizeof(thetahat_word))
-#define THETAHAT_RLS_WORDS(n) THETAHAT_WORDS((n) * (n) + 2 * (n) + 8, 40)
-#define THETAHAT_ARX_WORDS(n) THETAHAT_WORDS((n) * (n) + 3 * (n) + 24, 64 + 6 * (n))
-#define THETAHAT_ARMAX_WORDS(n) THETAHAT_WORDS(2 * (n) * (n) + 3 * (n) + 25, 80 + 6 * (n))
+#define THETAHAT_RLS_WORDS(n) THETAHAT_WORDS((n) * (n) + 3 * (n) + 9, 56 + (n))
+#define THETAHAT_ARX_WORDS(n) THETAHAT_WORDS((n) * (n) + 4 * (n) + 25, 80 + 7 * (n))
+#define THETAHAT_ARMAX_WORDS(n) THETAHAT_WORDS(2 * (n) * (n) + 4 * (n) + 26, 96 + 7 * (n))
 #define THETAHAT_KALMAN_WORDS(n, m) THETAHAT_WORDS((n) * (4 * (n) + (m) + 5) + (m) * ((m) + 4) + 1, 56)
 #define THETAHAT_EKF_WORDS(n, m) THETAHAT_WORDS((n) * (2 * (n) + 1) + (m) * (m) + 1, 40)
 #define THETAHAT_LUENBERGER_WORDS(n, m) THETAHAT_WORDS((n) * (3 * (n) + 2 * (m) + 5) + (m) * ((m) + 4), 48)
 #define THETAHAT_RST_WORDS(n) THETAHAT_WORDS(4 * (n) + 4, 16)
 #define THETAHAT_INDIRECT_WORDS(na, nb) \
-    THETAHAT_WORDS(((na) + (nb)) * ((na) + (nb) + 13) + 39, 6 * ((na) + (nb)) + 174)
+    THETAHAT_WORDS(((na) + (nb)) * ((na) + (nb) + 18) + 62, 7 * ((na) + (nb)) + 242)
 #define THETAHAT_DIRECT_WORDS(na, nb, delay) \
-    THETAHAT_WORDS(((na) + (nb) + (delay)) * ((na) + (nb) + (delay) + 3) + 2 * (delay) + 42 + \
-                   8 * ((nb) + (delay) - 2 > (na) ? (nb) + (delay) - 2 : (na)), 6 * ((na) + (nb) + (delay)) + 124)
+    THETAHAT_WORDS(((na) + (nb) + (delay)) * ((na) + (nb) + (delay) + 4) + 2 * (delay) + 65 + \
+                   12 * ((nb) + (delay) - 2 > (na) ? (nb) + (delay) - 2 : (na)), 7 * ((na) + (nb) + (delay)) + 198)
 #define THETAHAT_DETECTOR_WORDS THETAHAT_WORDS(8, 16)
 
 
@@ -87,6 +87,8 @@ enum thetahat_error
     THETAHAT_ERROR_OVERFLOW = 20,
     // Another error of the core.
     THETAHAT_ERROR_OTHER = 21,
+    // An observation has a D that does not belong to the inputs of the transition: set the transition first.
+    THETAHAT_ERROR_INPUTS = 22,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -104,7 +106,7 @@ enum thetahat_action
  {
     // The estimate was corrected.
     THETAHAT_ACTION_UPDATED = 0,
-    // It was corrected, and a variance that had grown to its bound was brought back to it.
+    // It was corrected, and a variance is at its bound: nothing is forgotten in its direction.
     THETAHAT_ACTION_CAPPED = 1,
     // It was corrected by less than the innovation asks for, so that C(q) stays stable.
     THETAHAT_ACTION_PROJECTED = 2,
@@ -122,8 +124,10 @@ enum thetahat_action
     THETAHAT_ACTION_GATED = 8,
     // It is above the gate, as were those before it, so many in a row that the measurement was used.
     THETAHAT_ACTION_RELEASED = 9,
+    // It was corrected by less than the innovation asks for, which is an outlier.
+    THETAHAT_ACTION_BOUNDED = 10,
     // Another action of the core.
-    THETAHAT_ACTION_OTHER = 10,
+    THETAHAT_ACTION_OTHER = 11,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -155,6 +159,28 @@ enum thetahat_forgetting
 typedef enum thetahat_forgetting thetahat_forgetting;
 #else
 typedef int32_t thetahat_forgetting;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What becomes of samples whose innovations are far larger than the noise makes them.
+enum thetahat_outliers
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // They correct as any other.
+    THETAHAT_OUTLIERS_USED = 0,
+    // They correct as one of `threshold` standard deviations does: 3 loses nothing where there are none.
+    THETAHAT_OUTLIERS_HUBER = 1,
+    // Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them in a
+    // row the next ones do.
+    THETAHAT_OUTLIERS_GATE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum thetahat_outliers thetahat_outliers;
+#else
+typedef int32_t thetahat_outliers;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -235,14 +261,66 @@ enum thetahat_tuner_state
     THETAHAT_TUNER_STATE_BRIDGING = 2,
     // The sensor says nothing for long: the input stays as it was.
     THETAHAT_TUNER_STATE_HOLDING = 3,
+    // It is not trusted: the fallback acts. `thetahat_tuner_trusted` says why.
+    THETAHAT_TUNER_STATE_DISTRUSTED = 4,
     // Another state of the core.
-    THETAHAT_TUNER_STATE_OTHER = 4,
+    THETAHAT_TUNER_STATE_OTHER = 5,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
 typedef enum thetahat_tuner_state thetahat_tuner_state;
 #else
 typedef int32_t thetahat_tuner_state;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Why a self-tuner is not trusted.
+enum thetahat_distrust
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // It is trusted.
+    THETAHAT_DISTRUST_NONE = 0,
+    // The gain of the model has another sign than was given, or than was known.
+    THETAHAT_DISTRUST_SIGN = 1,
+    // The input goes from one limit to the other while the set point stays.
+    THETAHAT_DISTRUST_SATURATED = 2,
+    // No controller was designed for long.
+    THETAHAT_DISTRUST_AGE = 3,
+    // No controller was designed for long: none of those that are tried has margins that are bearable.
+    THETAHAT_DISTRUST_MARGIN = 4,
+    // The model predicts worse than the latest measurement does.
+    THETAHAT_DISTRUST_INNOVATIONS = 5,
+    // Another reason of the core.
+    THETAHAT_DISTRUST_OTHER = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum thetahat_distrust thetahat_distrust;
+#else
+typedef int32_t thetahat_distrust;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// What acts while a self-tuner is not trusted.
+enum thetahat_fallback
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : int32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // An input that stays: the mean of the inputs in the latest 64 sound samples.
+    THETAHAT_FALLBACK_HOLD = 0,
+    // The controller of the latest 64 sound samples.
+    THETAHAT_FALLBACK_LAST_GOOD = 1,
+    // An input that is given.
+    THETAHAT_FALLBACK_INPUT = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum thetahat_fallback thetahat_fallback;
+#else
+typedef int32_t thetahat_fallback;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -368,6 +446,12 @@ typedef struct {
     uint32_t blend;
     // Innovations up to this, in the unit of y, correct nothing. 0 for none.
     thetahat_number dead_zone;
+    // A `thetahat_outliers`.
+    int32_t outliers;
+    // From 1 on: in standard deviations for Huber's rule, a normalised innovation squared for the gate.
+    thetahat_number threshold;
+    // After how many outliers in a row the gate lets go, 0 ... 65535; 0 for never.
+    uint32_t release;
 } thetahat_learning;
 
 // The innovation of a sample: the part of the measurement that was not predicted.
@@ -470,6 +554,22 @@ typedef struct {
     uint32_t stuck_after;
     // For so many missing samples in a row the controller goes on with what its model predicts, up to 65535.
     uint32_t longest_gap;
+    // What acts while the tuner is not trusted, a `thetahat_fallback`.
+    int32_t fallback;
+    // The input of THETAHAT_FALLBACK_INPUT.
+    thetahat_number fallback_input;
+    // The amplitude that excites the plant then, in the unit of the input. With 0 trust may not come back by itself.
+    thetahat_number excitation;
+    // The largest mean share of samples in which the input is at a limit, at both of them while the set point stays, 0
+    // ... 1; 1 for any.
+    thetahat_number saturated;
+    // For so many samples in a row a design may be refused, a quarter of it where the sign is surely wrong, up to
+    // 65535; 0 for any.
+    uint32_t refused;
+    // The largest ratio of the mean squared innovation to the mean squared change of the measurement, 1 or more.
+    thetahat_number innovations;
+    // Whether the fallback acts too where the design is only old, 0 or 1: with 0 the controller goes on.
+    uint32_t replace_old;
 } thetahat_tuner_wish;
 
 #ifdef __cplusplus
@@ -829,6 +929,20 @@ thetahat_error thetahat_arx_set_fit(thetahat_arx *arx,
                                     thetahat_number noise_variance,
                                     size_t samples);
 
+// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
+// 2.5 n^3 multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
+thetahat_error thetahat_arx_set_covariance(thetahat_arx *arx,
+                                           const thetahat_number *covariance);
+
+// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
+// that has changed, as after a repair.
+//
+// Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
+thetahat_error thetahat_arx_widen(thetahat_arx *arx,
+                                  thetahat_number factor);
+
 // Turns adaptation off (0), or on again (1). While it is off innovations are computed and nothing changes.
 thetahat_error thetahat_arx_set_adaptation(thetahat_arx *arx, uint32_t on);
 
@@ -882,6 +996,24 @@ thetahat_error thetahat_ekf_init(thetahat_ekf **ekf,
 thetahat_error thetahat_ekf_set_noise(thetahat_ekf *ekf,
                                       const thetahat_number *process_noise,
                                       const thetahat_number *measurement_noise);
+
+// Puts the state where it is known to be, n numbers. P stays, and what the gate has counted starts anew.
+//
+// Errors: NOT_FINITE.
+thetahat_error thetahat_ekf_set_state(thetahat_ekf *ekf, const thetahat_number *state);
+
+// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+thetahat_error thetahat_ekf_set_covariance(thetahat_ekf *ekf,
+                                           const thetahat_number *covariance);
+
+// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
+// says, as after a fault.
+//
+// Errors: OUT_OF_RANGE; OVERFLOW.
+thetahat_error thetahat_ekf_widen(thetahat_ekf *ekf,
+                                  thetahat_number factor);
 
 // Sets a gate, and after how many measurements above it in a row it lets go: as `thetahat_kalman_set_gate`.
 //
@@ -952,7 +1084,8 @@ thetahat_error thetahat_kalman_init(thetahat_kalman **kalman,
 // - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 // - noise: Q, n x n; NULL for 0.
 //
-// Errors: LENGTH for too many inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
+// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE;
+// NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
 thetahat_error thetahat_kalman_set_transition(thetahat_kalman *kalman,
                                               const thetahat_number *state_matrix,
                                               const thetahat_number *input_matrix,
@@ -962,14 +1095,32 @@ thetahat_error thetahat_kalman_set_transition(thetahat_kalman *kalman,
 // Sets what is measured: y = H x + D u + v, v ~ (0, R). It may be set again at any time.
 //
 // - output_matrix: H, m x n.
-// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0.
+// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
 // - noise: R, m x m; NULL for 0.
 //
-// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 thetahat_error thetahat_kalman_set_observation(thetahat_kalman *kalman,
                                                const thetahat_number *output_matrix,
                                                const thetahat_number *input_matrix,
                                                const thetahat_number *noise);
+
+// Puts the state where it is known to be, n numbers. P stays, and what the gate has counted starts anew.
+//
+// Errors: NOT_FINITE.
+thetahat_error thetahat_kalman_set_state(thetahat_kalman *kalman, const thetahat_number *state);
+
+// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+thetahat_error thetahat_kalman_set_covariance(thetahat_kalman *kalman,
+                                              const thetahat_number *covariance);
+
+// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
+// says, as after a fault.
+//
+// Errors: OUT_OF_RANGE; OVERFLOW.
+thetahat_error thetahat_kalman_widen(thetahat_kalman *kalman,
+                                     thetahat_number factor);
 
 // Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at first.
 // After `release` such measurements in a row, 1 ... 65535, those that follow are used all the same; 0 for never.
@@ -1026,7 +1177,7 @@ thetahat_error thetahat_luenberger_init(thetahat_luenberger **luenberger,
 // - state_matrix: F, n x n, row by row, as all matrices.
 // - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 //
-// Errors: LENGTH for too many inputs; NOT_FINITE.
+// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE.
 thetahat_error thetahat_luenberger_set_transition(thetahat_luenberger *luenberger,
                                                   const thetahat_number *state_matrix,
                                                   const thetahat_number *input_matrix,
@@ -1035,9 +1186,9 @@ thetahat_error thetahat_luenberger_set_transition(thetahat_luenberger *luenberge
 // Sets what is measured: y = H x + D u. It may be set again at any time.
 //
 // - output_matrix: H, m x n.
-// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0.
+// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
 //
-// Errors: NOT_FINITE.
+// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE.
 thetahat_error thetahat_luenberger_set_observation(thetahat_luenberger *luenberger,
                                                    const thetahat_number *output_matrix,
                                                    const thetahat_number *input_matrix);
@@ -1065,6 +1216,11 @@ thetahat_error thetahat_luenberger_update(thetahat_luenberger *luenberger,
                                           const thetahat_number *input,
                                           const thetahat_number *measurement,
                                           thetahat_innovation *innovation);
+
+// Puts the estimate where the state is known to be, n numbers.
+//
+// Errors: NOT_FINITE.
+thetahat_error thetahat_luenberger_set_state(thetahat_luenberger *luenberger, const thetahat_number *state);
 
 // Reads the state at the next sample, n numbers.
 thetahat_error thetahat_luenberger_state(const thetahat_luenberger *luenberger, thetahat_number *state);
@@ -1127,6 +1283,20 @@ thetahat_error thetahat_rls_covariance(const thetahat_rls *rls, thetahat_number 
 // Errors: NOT_FINITE; TOO_LARGE.
 thetahat_error thetahat_rls_set_parameters(thetahat_rls *rls, const thetahat_number *parameters);
 
+// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
+// 2.5 n^3 multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
+thetahat_error thetahat_rls_set_covariance(thetahat_rls *rls,
+                                           const thetahat_number *covariance);
+
+// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
+// that has changed, as after a repair.
+//
+// Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
+thetahat_error thetahat_rls_widen(thetahat_rls *rls,
+                                  thetahat_number factor);
+
 // Turns adaptation off (0), or on again (1). While it is off innovations are computed and nothing changes.
 thetahat_error thetahat_rls_set_adaptation(thetahat_rls *rls, uint32_t on);
 
@@ -1188,9 +1358,11 @@ thetahat_error thetahat_rst_place(const thetahat_rst_place_size *size,
                                   const thetahat_rst_poles *poles,
                                   thetahat_rst_law *law);
 
-// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with damping 0.9, an
-// observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain, probing with a tenth of
-// the scale to twice, any range of the sensor, never stuck, 100 missing samples from the model.
+// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with
+// damping 0.9, an observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain,
+// probing with a tenth of the scale to twice, any range of the sensor, never stuck, 100 missing samples from the
+// model. Where it is not trusted the input is held, and excited by a tenth of the scale; for that half of the samples
+// are at the limits, 200 designs refused, or innovations twice the changes.
 //
 // Errors: NULL_POINTER.
 thetahat_error thetahat_tuner_usual(thetahat_tuner_wish *wish,
@@ -1206,8 +1378,8 @@ thetahat_error thetahat_tuner_usual(thetahat_tuner_wish *wish,
 //   bytes.
 // - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
 // - wish: what is asked for.
-// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. Exponential forgetting
-//   with 0.98, or 0.99 for slow changes, tracks well.
+// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. The random
+//   walk with a variance of 1e-4 tracks best, where the scales are right; else exponential forgetting with 0.98.
 //
 // Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a number of the wish or of the policy is out of its range.
 thetahat_error thetahat_tuner_init(thetahat_tuner **tuner,
@@ -1249,6 +1421,32 @@ thetahat_error thetahat_tuner_set_adaptation(thetahat_tuner *tuner, uint32_t on)
 thetahat_error thetahat_tuner_read(const thetahat_tuner *tuner,
                                    int32_t *state,
                                    thetahat_number *parameters);
+
+// Reads whether it is trusted. Each of the places may be NULL.
+//
+// - distrust: why it is not, a `thetahat_distrust`.
+// - innovation: what the latest measurement told the model.
+// - design_age: the samples since the latest design that was accepted.
+thetahat_error thetahat_tuner_trusted(const thetahat_tuner *tuner,
+                                      int32_t *distrust,
+                                      thetahat_innovation *innovation,
+                                      uint32_t *design_age);
+
+// Trusts it from now on: the controller acts, or the plant is excited until there is one. It comes back by itself
+// where the model is good again; this is for a user who knows better.
+thetahat_error thetahat_tuner_trust(thetahat_tuner *tuner);
+
+// Says that the gain of the plant has this sign from now on, or 0 that it is not known.
+//
+// Errors: OUT_OF_RANGE if it is not finite.
+thetahat_error thetahat_tuner_set_gain_sign(thetahat_tuner *tuner, thetahat_number sign);
+
+// What acts from now on while it is not trusted: a `thetahat_fallback`, and the input of THETAHAT_FALLBACK_INPUT.
+//
+// Errors: OUT_OF_RANGE if it is none, or that input is not finite.
+thetahat_error thetahat_tuner_set_fallback(thetahat_tuner *tuner,
+                                           int32_t kind,
+                                           thetahat_number input);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -9,7 +9,7 @@ use crate::error::code;
 use crate::innovation::Innovation;
 use crate::learning::{self, Estimate, Learning};
 use crate::memory::{self, Kind, Made, Place, View, Word};
-use crate::shapes::{matrix, vector};
+use crate::shapes::{covariance, matrix, vector};
 use crate::{Error, Number};
 
 /// The most inputs of a model.
@@ -133,6 +133,8 @@ pub(crate) trait Plant {
     fn log_row(&mut self, output: Number, inputs: &[Number]) -> Result<Innovation, Error>;
     fn predict(&self, inputs: &[Number], outputs: &mut [Number]) -> Result<(), Error>;
     fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error>;
+    fn set_covariance(&mut self, variance: &[Number]) -> Result<(), Error>;
+    fn widen(&mut self, factor: Number) -> Result<(), Error>;
     fn set_adaptation(&mut self, on: bool);
     fn estimate(&self) -> &dyn Estimate;
 }
@@ -157,13 +159,19 @@ macro_rules! plant {
             }
 
             fn set_parameters(&mut self, parameters: &[Number], fit: Option<&Fit<'_>>) -> Result<(), Error> {
-                let mut changed = self.clone().with_parameters(vector(parameters))?;
-                if let Some(fit) = fit {
-                    changed = changed.with_covariance(fit.covariance()?)?;
-                    changed = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
-                }
-                *self = changed;
+                let parameters = vector(parameters);
+                let Some(fit) = fit else { return Ok(self.set_parameters(parameters)?) };
+                let changed = self.clone().with_parameters(parameters)?.with_covariance(fit.covariance()?)?;
+                *self = changed.with_noise_variance(fit.noise_variance, fit.samples)?;
                 Ok(())
+            }
+
+            fn set_covariance(&mut self, variance: &[Number]) -> Result<(), Error> {
+                Ok(self.set_covariance(covariance(Some(variance))?)?)
+            }
+
+            fn widen(&mut self, factor: Number) -> Result<(), Error> {
+                Ok(self.widen(factor)?)
             }
 
             fn set_adaptation(&mut self, on: bool) {
@@ -194,7 +202,8 @@ fn init_arx<const N: usize>(place: Place<Arx>, model: &ArxModel, learning: &Lear
     let policy = learning.policy()?;
     let mut plant: ArxEstimator<N> =
         RecursiveArx::new(&orders, model.output_scale, scales.unwrap_or_default(), policy)?
-            .with_dead_zone(learning.dead_zone)?;
+            .with_dead_zone(learning.dead_zone)?
+            .with_outliers(learning.outliers()?)?;
     if let Some(start) = learning.start()? {
         plant = plant.with_start(start)?;
     }
@@ -223,7 +232,7 @@ fn init_armax<const N: usize>(place: Place<Arx>, model: &ArxModel, learning: &Le
     let (scales, policy) = (scales.unwrap_or_default(), learning.policy()?);
     let plant: ArmaxEstimator<N> =
         RecursiveArmax::new(&orders, method, model.output_scale, scales, model.noise_scale, policy)?;
-    place.write(plant.with_dead_zone(learning.dead_zone)?)
+    place.write(plant.with_dead_zone(learning.dead_zone)?.with_outliers(learning.outliers()?)?)
 }
 
 /// Makes an estimator that knows nothing yet, and has seen no sample.
@@ -392,6 +401,28 @@ pub unsafe extern "C" fn thetahat_arx_set_fit(
         let (parameters, factor) = (memory::array(parameters, n)?, memory::array(factor, n * n)?);
         plant.set_parameters(parameters, Some(&Fit { factor, noise_variance, samples }))
     })
+}
+
+/// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
+/// 2.5 n^3 multiply-adds.
+///
+/// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_arx_set_covariance(arx: *mut Arx, covariance: *const Number) -> Error {
+    code(|| {
+        let estimator = memory::open(arx)?;
+        let n = estimator.estimate().parameters().len();
+        estimator.set_covariance(memory::array(covariance, n * n)?)
+    })
+}
+
+/// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
+/// that has changed, as after a repair.
+///
+/// Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_arx_widen(arx: *mut Arx, factor: Number) -> Error {
+    code(|| memory::open(arx)?.widen(factor))
 }
 
 /// Turns adaptation off (0), or on again (1). While it is off innovations are computed and nothing changes.

@@ -7,9 +7,8 @@ use thetahat_core::{Covariance, ExtendedKalmanFilter, Observation, Transition};
 
 use crate::error::code;
 use crate::innovation::Innovation;
-use crate::linear::covariance;
 use crate::memory::{self, Init, Kind, Made, Place, View, Word};
-use crate::shapes::{matrix, vector, write};
+use crate::shapes::{covariance, matrix, vector, write};
 use crate::{Error, Number};
 
 /// The extended Kalman filter of x(k+1) = f(x) + w, y = h(x) + v, with w ~ (0, Q) and v ~ (0, R).
@@ -107,11 +106,11 @@ impl<const N: usize> Transition<Number, Const<N>> for With<'_, Covariance<Number
         self.model.value(state)
     }
 
-    fn jacobian(&self, state: &SVector<Number, N>, _: &SVector<Number, 0>) -> SMatrix<Number, N, N> {
+    fn next_jacobian(&self, state: &SVector<Number, N>, _: &SVector<Number, 0>) -> SMatrix<Number, N, N> {
         self.model.jacobian(state)
     }
 
-    fn noise(&self, _: &SVector<Number, N>, _: &SVector<Number, 0>) -> Covariance<Number, Const<N>> {
+    fn process_noise(&self, _: &SVector<Number, N>, _: &SVector<Number, 0>) -> Covariance<Number, Const<N>> {
         self.noise.clone()
     }
 }
@@ -123,11 +122,15 @@ impl<const N: usize, const M: usize> Observation<Number, Const<N>, Const<M>>
         self.model.value(state)
     }
 
-    fn jacobian(&self, state: &SVector<Number, N>, _: &SVector<Number, 0>) -> SMatrix<Number, M, N> {
+    fn output_jacobian(&self, state: &SVector<Number, N>, _: &SVector<Number, 0>) -> SMatrix<Number, M, N> {
         self.model.jacobian(state)
     }
 
-    fn noise(&self, _: &SVector<Number, N>, _: &SVector<Number, 0>) -> Covariance<Number, Const<M>> {
+    fn measurement_noise(
+        &self,
+        _: &SVector<Number, N>,
+        _: &SVector<Number, 0>,
+    ) -> Covariance<Number, Const<M>> {
         self.noise.clone()
     }
 }
@@ -144,6 +147,9 @@ pub(crate) trait Filter {
     /// The numbers of states and outputs.
     fn sizes(&self) -> [usize; 2];
     fn set_noise(&mut self, process: Option<&[Number]>, measurement: Option<&[Number]>) -> Result<(), Error>;
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error>;
+    fn set_covariance(&mut self, variance: Option<&[Number]>) -> Result<(), Error>;
+    fn widen(&mut self, factor: Number) -> Result<(), Error>;
     fn set_gate(&mut self, gate: Number, release: u16) -> Result<(), Error>;
     fn set_iterations(&mut self, count: usize) -> Result<(), Error>;
     fn predict(&mut self, transition: Model) -> Result<(), Error>;
@@ -162,14 +168,26 @@ impl<const N: usize, const M: usize> Filter for Noisy<N, M> {
         Ok(())
     }
 
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error> {
+        Ok(self.filter.set_state(vector(state))?)
+    }
+
+    fn set_covariance(&mut self, variance: Option<&[Number]>) -> Result<(), Error> {
+        Ok(self.filter.set_covariance(covariance(variance)?)?)
+    }
+
+    fn widen(&mut self, factor: Number) -> Result<(), Error> {
+        Ok(self.filter.widen(factor)?)
+    }
+
     fn set_gate(&mut self, gate: Number, release: u16) -> Result<(), Error> {
-        self.filter = self.filter.clone().with_gate(gate)?.with_release(release);
+        self.filter.set_gate(gate)?;
+        self.filter.set_release(release);
         Ok(())
     }
 
     fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
-        self.filter = self.filter.clone().with_iterations(count)?;
-        Ok(())
+        Ok(self.filter.set_iterations(count)?)
     }
 
     fn predict(&mut self, model: Model) -> Result<(), Error> {
@@ -244,6 +262,39 @@ pub unsafe extern "C" fn thetahat_ekf_set_noise(
         let [n, m] = filter.sizes();
         filter.set_noise(memory::optional(process_noise, n * n)?, memory::optional(measurement_noise, m * m)?)
     })
+}
+
+/// Puts the state where it is known to be, n numbers. P stays, and what the gate has counted starts anew.
+///
+/// Errors: NOT_FINITE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_ekf_set_state(ekf: *mut Ekf, state: *const Number) -> Error {
+    code(|| {
+        let filter = memory::open(ekf)?;
+        let [states, _] = filter.sizes();
+        filter.set_state(memory::array(state, states)?)
+    })
+}
+
+/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+///
+/// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_ekf_set_covariance(ekf: *mut Ekf, covariance: *const Number) -> Error {
+    code(|| {
+        let filter = memory::open(ekf)?;
+        let [states, _] = filter.sizes();
+        filter.set_covariance(memory::optional(covariance, states * states)?)
+    })
+}
+
+/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
+/// says, as after a fault.
+///
+/// Errors: OUT_OF_RANGE; OVERFLOW.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_ekf_widen(ekf: *mut Ekf, factor: Number) -> Error {
+    code(|| memory::open(ekf)?.widen(factor))
 }
 
 /// Sets a gate, and after how many measurements above it in a row it lets go: as `thetahat_kalman_set_gate`.

@@ -50,10 +50,12 @@ pub enum Error {
     Overflow = 20,
     /// Another error of the core.
     Other = 21,
+    /// An observation has a D that does not belong to the inputs of the transition: set the transition first.
+    Inputs = 22,
 }
 
 /// Name and text of each error, in the order of the codes.
-static TEXTS: [(&CStr, &CStr); 22] = [
+static TEXTS: [(&CStr, &CStr); 23] = [
     (c"NONE", c"all is well"),
     (c"NULL_POINTER", c"a pointer is NULL: pass an array or object"),
     (c"MISALIGNED", c"a pointer is not aligned: declare memory as thetahat_word, numbers as thetahat_number"),
@@ -88,6 +90,11 @@ static TEXTS: [(&CStr, &CStr); 22] = [
     ),
     (c"OVERFLOW", c"a result is too large for a number: use other units, or double precision"),
     (c"OTHER", c"an error without a code of its own"),
+    (
+        c"INPUTS",
+        c"D does not fit the inputs of the transition: set the transition first, then the observation with its D; \
+          before the number of inputs changes, set the observation without D",
+    ),
 ];
 
 impl From<thetahat_core::Error> for Error {

@@ -16,7 +16,7 @@ pub const THETAHAT_MOST_OUTPUTS: usize = 3;
 pub enum Action {
     /// The estimate was corrected.
     Updated = 0,
-    /// It was corrected, and a variance that had grown to its bound was brought back to it.
+    /// It was corrected, and a variance is at its bound: nothing is forgotten in its direction.
     Capped = 1,
     /// It was corrected by less than the innovation asks for, so that C(q) stays stable.
     Projected = 2,
@@ -34,11 +34,13 @@ pub enum Action {
     Gated = 8,
     /// It is above the gate, as were those before it, so many in a row that the measurement was used.
     Released = 9,
+    /// It was corrected by less than the innovation asks for, which is an outlier.
+    Bounded = 10,
     /// Another action of the core.
-    Other = 10,
+    Other = 11,
 }
 
-static WORDS: [&CStr; 11] = [
+static WORDS: [&CStr; 12] = [
     c"updated",
     c"capped",
     c"projected",
@@ -49,6 +51,7 @@ static WORDS: [&CStr; 11] = [
     c"skipped",
     c"gated",
     c"released",
+    c"bounded",
     c"other",
 ];
 
@@ -66,6 +69,7 @@ impl From<thetahat_core::Action> for Action {
             Core::Skipped => Action::Skipped,
             Core::Gated => Action::Gated,
             Core::Released => Action::Released,
+            Core::Bounded => Action::Bounded,
             _ => Action::Other,
         }
     }
@@ -110,8 +114,8 @@ impl Innovation {
         // A detector does not ask what was done.
         let action = thetahat_core::Action::Updated;
         let ([first, ..], [of_first, ..]) = (error, variance);
-        let one = CoreInnovation { error: first, variance: of_first, nis, action };
-        (one, CoreInnovation { error: error.into(), variance: variance.into(), nis, action })
+        let one = CoreInnovation::new(first, of_first, nis, action);
+        (one, CoreInnovation::new(error.into(), variance.into(), nis, action))
     }
 }
 
@@ -119,7 +123,7 @@ type Elements = SVector<Number, THETAHAT_MOST_OUTPUTS>;
 
 impl From<CoreInnovation<Number>> for Innovation {
     fn from(innovation: CoreInnovation<Number>) -> Self {
-        let CoreInnovation { error, variance, nis, action } = innovation;
+        let CoreInnovation { error, variance, nis, action, .. } = innovation;
         Innovation::new(&[error], &[variance], nis, action)
     }
 }
@@ -129,7 +133,7 @@ where
     Const<M>: thetahat_core::Dimension,
 {
     fn from(innovation: CoreInnovation<Number, SVector<Number, M>>) -> Self {
-        let CoreInnovation { error, variance, nis, action } = innovation;
+        let CoreInnovation { error, variance, nis, action, .. } = innovation;
         Innovation::new(error.as_slice(), variance.as_slice(), nis, action)
     }
 }

@@ -5,9 +5,9 @@ use thetahat_core::nalgebra::Const;
 
 use crate::error::code;
 use crate::innovation::Innovation;
-use crate::linear::{self, Input, Matrices, Models, covariance};
+use crate::linear::{self, Input, Matrices, Models};
 use crate::memory::{self, Init, Kind, Made, Place, View, Word};
-use crate::shapes::{vector, write};
+use crate::shapes::{covariance, vector, write};
 use crate::{Error, Number};
 
 /// The Kalman filter of x(k+1) = F x + G u + w, y = H x + D u + v, with w ~ (0, Q) and v ~ (0, R).
@@ -50,6 +50,9 @@ pub(crate) trait Filter {
     fn sizes(&self) -> [usize; 3];
     fn set_transition(&mut self, given: &Matrices<'_>) -> Result<(), Error>;
     fn set_observation(&mut self, given: &Matrices<'_>) -> Result<(), Error>;
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error>;
+    fn set_covariance(&mut self, variance: Option<&[Number]>) -> Result<(), Error>;
+    fn widen(&mut self, factor: Number) -> Result<(), Error>;
     fn set_gate(&mut self, gate: Number, release: u16) -> Result<(), Error>;
     fn predict(&mut self, input: &Input) -> Result<(), Error>;
     fn correct(&mut self, input: &Input, measurement: &[Number]) -> Result<Innovation, Error>;
@@ -70,8 +73,21 @@ impl<const N: usize, const M: usize> Filter for Modelled<N, M> {
         self.models.set_observation(given)
     }
 
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error> {
+        Ok(self.filter.set_state(vector(state))?)
+    }
+
+    fn set_covariance(&mut self, variance: Option<&[Number]>) -> Result<(), Error> {
+        Ok(self.filter.set_covariance(covariance(variance)?)?)
+    }
+
+    fn widen(&mut self, factor: Number) -> Result<(), Error> {
+        Ok(self.filter.widen(factor)?)
+    }
+
     fn set_gate(&mut self, gate: Number, release: u16) -> Result<(), Error> {
-        self.filter = self.filter.clone().with_gate(gate)?.with_release(release);
+        self.filter.set_gate(gate)?;
+        self.filter.set_release(release);
         Ok(())
     }
 
@@ -136,7 +152,8 @@ pub unsafe extern "C" fn thetahat_kalman_init(
 /// - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 /// - noise: Q, n x n; NULL for 0.
 ///
-/// Errors: LENGTH for too many inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
+/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE;
+/// NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_kalman_set_transition(
     kalman: *mut Kalman,
@@ -156,10 +173,10 @@ pub unsafe extern "C" fn thetahat_kalman_set_transition(
 /// Sets what is measured: y = H x + D u + v, v ~ (0, R). It may be set again at any time.
 ///
 /// - output_matrix: H, m x n.
-/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0.
+/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
 /// - noise: R, m x m; NULL for 0.
 ///
-/// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+/// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_kalman_set_observation(
     kalman: *mut Kalman,
@@ -173,6 +190,42 @@ pub unsafe extern "C" fn thetahat_kalman_set_observation(
         let given = linear::matrices([outputs, states, inputs], output_matrix, input_matrix, noise)?;
         filter.set_observation(&given)
     })
+}
+
+/// Puts the state where it is known to be, n numbers. P stays, and what the gate has counted starts anew.
+///
+/// Errors: NOT_FINITE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_kalman_set_state(kalman: *mut Kalman, state: *const Number) -> Error {
+    code(|| {
+        let filter = memory::open(kalman)?;
+        let [states, ..] = filter.sizes();
+        filter.set_state(memory::array(state, states)?)
+    })
+}
+
+/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+///
+/// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_kalman_set_covariance(
+    kalman: *mut Kalman,
+    covariance: *const Number,
+) -> Error {
+    code(|| {
+        let filter = memory::open(kalman)?;
+        let [states, ..] = filter.sizes();
+        filter.set_covariance(memory::optional(covariance, states * states)?)
+    })
+}
+
+/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
+/// says, as after a fault.
+///
+/// Errors: OUT_OF_RANGE; OVERFLOW.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_kalman_widen(kalman: *mut Kalman, factor: Number) -> Error {
+    code(|| memory::open(kalman)?.widen(factor))
 }
 
 /// Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at first.

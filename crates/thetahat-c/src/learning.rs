@@ -1,4 +1,4 @@
-//! How an estimator of parameters learns: forgetting, start, dead zone.
+//! How an estimator of parameters learns: forgetting, start, dead zone, outliers.
 
 use thetahat_core::RlsStart;
 use thetahat_core::nalgebra::Const;
@@ -20,6 +20,19 @@ pub enum Forgetting {
     RandomWalk = 3,
     /// Forgets where an innovation is large: factor, minimum and noise_variance are needed.
     Variable = 4,
+}
+
+/// What becomes of samples whose innovations are far larger than the noise makes them.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outliers {
+    /// They correct as any other.
+    Used = 0,
+    /// They correct as one of `threshold` standard deviations does: 3 loses nothing where there are none.
+    Huber = 1,
+    /// Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them in a
+    /// row the next ones do.
+    Gate = 2,
 }
 
 /// How an estimator starts.
@@ -55,6 +68,12 @@ pub struct Learning {
     pub blend: u32,
     /// Innovations up to this, in the unit of y, correct nothing. 0 for none.
     pub dead_zone: Number,
+    /// A `thetahat_outliers`.
+    pub outliers: i32,
+    /// From 1 on: in standard deviations for Huber's rule, a normalised innovation squared for the gate.
+    pub threshold: Number,
+    /// After how many outliers in a row the gate lets go, 0 ... 65535; 0 for never.
+    pub release: u32,
 }
 
 impl Learning {
@@ -67,6 +86,9 @@ impl Learning {
         start: Start::Standard as i32,
         blend: 0,
         dead_zone: 0.0,
+        outliers: Outliers::Used as i32,
+        threshold: 0.0,
+        release: 0,
     };
 
     /// What is given, or the default.
@@ -89,6 +111,21 @@ impl Learning {
             policy if policy == Forgetting::RandomWalk as i32 => Ok(Core::RandomWalk { variance }),
             policy if policy == Forgetting::Variable as i32 => {
                 Ok(Core::Variable { factor, minimum, noise_variance })
+            }
+            _ => Err(Error::OutOfRange),
+        }
+    }
+
+    /// The rule for outliers, with its numbers.
+    pub(crate) fn outliers(&self) -> Result<thetahat_core::Outliers<Number>, Error> {
+        use thetahat_core::Outliers as Core;
+        let &Learning { threshold, .. } = self;
+        match self.outliers {
+            rule if rule == Outliers::Used as i32 => Ok(Core::Used),
+            rule if rule == Outliers::Huber as i32 => Ok(Core::Huber { threshold }),
+            rule if rule == Outliers::Gate as i32 => {
+                let release = u16::try_from(self.release).map_err(|_| Error::OutOfRange)?;
+                Ok(Core::Gate { nis: threshold, release })
             }
             _ => Err(Error::OutOfRange),
         }

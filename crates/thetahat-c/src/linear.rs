@@ -1,10 +1,10 @@
 //! Linear models from arrays of C, as Kalman filters and observers hold them.
 
 use thetahat_core::nalgebra::{Const, SVector};
-use thetahat_core::{Covariance, LinearObservation, LinearTransition};
+use thetahat_core::{LinearObservation, LinearTransition};
 
 use crate::arx::THETAHAT_MOST_INPUTS;
-use crate::shapes::{matrix, vector};
+use crate::shapes::{covariance, matrix, vector};
 use crate::{Error, Number, memory};
 
 type Inputs = Const<THETAHAT_MOST_INPUTS>;
@@ -36,8 +36,13 @@ impl<const N: usize, const M: usize> Models<N, M> {
         self.observation.as_ref().ok_or(Error::NoModel)
     }
 
-    /// Sets F, n x n, G, n x inputs, and Q, n x n. What is not given is 0.
+    /// Sets F, n x n, G, n x inputs, and Q, n x n. What is not given is 0. The number of inputs does not change under a D that is
+    /// not 0: its columns are those of the inputs before.
     pub(crate) fn set_transition(&mut self, given: &Matrices<'_>) -> Result<(), Error> {
+        let has_direct = |own: &Observation<N, M>| own.input_matrix().iter().any(|entry| *entry != 0.0);
+        if given.inputs != self.inputs && self.observation.as_ref().is_some_and(has_direct) {
+            return Err(Error::Inputs);
+        }
         let transition = LinearTransition::new(matrix(given.of_state, N), covariance(given.noise)?)?;
         let input_matrix = matrix(given.of_input.unwrap_or_default(), given.inputs);
         self.transition = Some(transition.with_input(input_matrix)?);
@@ -45,20 +50,16 @@ impl<const N: usize, const M: usize> Models<N, M> {
         Ok(())
     }
 
-    /// Sets H, m x n, D, m x inputs, and R, m x m. What is not given is 0.
+    /// Sets H, m x n, D, m x inputs, and R, m x m. What is not given is 0. Without inputs no D is given.
     pub(crate) fn set_observation(&mut self, given: &Matrices<'_>) -> Result<(), Error> {
+        if given.inputs == 0 && given.of_input.is_some() {
+            return Err(Error::Inputs);
+        }
         let observation = LinearObservation::new(matrix(given.of_state, N), covariance(given.noise)?)?;
         let input_matrix = matrix(given.of_input.unwrap_or_default(), given.inputs);
         self.observation = Some(observation.with_input(input_matrix)?);
         Ok(())
     }
-}
-
-/// The covariance with these entries; that of no noise if there are none.
-pub(crate) fn covariance<const N: usize>(
-    entries: Option<&[Number]>,
-) -> Result<Covariance<Number, Const<N>>, Error> {
-    Ok(entries.map_or(Ok(Covariance::zero(Const)), |entries| Covariance::new(&matrix(entries, N)))?)
 }
 
 /// The matrices of a transition or an observation, row by row.

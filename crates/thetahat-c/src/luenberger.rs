@@ -54,6 +54,7 @@ pub(crate) trait Observer {
     fn set_observation(&mut self, given: &Matrices<'_>) -> Result<(), Error>;
     fn place(&mut self, poles: [&[Number]; 2], weights: Option<&[Number]>) -> Result<(), Error>;
     fn update(&mut self, input: &Input, measurement: &[Number]) -> Result<Innovation, Error>;
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error>;
     fn state(&self) -> &[Number];
     fn write_gain(&self, target: &mut [Number]);
 }
@@ -84,6 +85,10 @@ impl<const N: usize, const M: usize> Observer for Modelled<N, M> {
     fn update(&mut self, input: &Input, measurement: &[Number]) -> Result<Innovation, Error> {
         let (transition, observation) = (self.models.transition()?, self.models.observation()?);
         Ok(self.observer.update(transition, observation, input, &vector(measurement))?.into())
+    }
+
+    fn set_state(&mut self, state: &[Number]) -> Result<(), Error> {
+        Ok(self.observer.set_state(vector(state))?)
     }
 
     fn state(&self) -> &[Number] {
@@ -138,7 +143,7 @@ pub unsafe extern "C" fn thetahat_luenberger_init(
 /// - state_matrix: F, n x n, row by row, as all matrices.
 /// - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 ///
-/// Errors: LENGTH for too many inputs; NOT_FINITE.
+/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_luenberger_set_transition(
     luenberger: *mut Luenberger,
@@ -157,9 +162,9 @@ pub unsafe extern "C" fn thetahat_luenberger_set_transition(
 /// Sets what is measured: y = H x + D u. It may be set again at any time.
 ///
 /// - output_matrix: H, m x n.
-/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0.
+/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
 ///
-/// Errors: NOT_FINITE.
+/// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_luenberger_set_observation(
     luenberger: *mut Luenberger,
@@ -217,6 +222,21 @@ pub unsafe extern "C" fn thetahat_luenberger_update(
         let told = observer.update(&linear::input(input, inputs)?, measurement)?;
         memory::answer(innovation, told);
         Ok(())
+    })
+}
+
+/// Puts the estimate where the state is known to be, n numbers.
+///
+/// Errors: NOT_FINITE.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_luenberger_set_state(
+    luenberger: *mut Luenberger,
+    state: *const Number,
+) -> Error {
+    code(|| {
+        let observer = memory::open(luenberger)?;
+        let [states, ..] = observer.sizes();
+        observer.set_state(memory::array(state, states)?)
     })
 }
 

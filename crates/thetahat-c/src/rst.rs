@@ -234,12 +234,11 @@ pub unsafe extern "C" fn thetahat_rst_place(
     code(|| {
         let (size, poles) = (&*memory::follow(size)?, *memory::follow(poles)?);
         let (a, b) = (memory::array(a, a_count)?, memory::array(b, b_count)?);
-        let wanted = WantedPoles {
-            response: memory::array(poles.response, poles.response_count)?,
-            observer: memory::array(poles.observer, poles.observer_count)?,
-            integrator: poles.integrator != 0,
-            cancel_zeros: poles.cancel_zeros != 0,
-        };
+        let response = memory::array(poles.response, poles.response_count)?;
+        let observer = memory::array(poles.observer, poles.observer_count)?;
+        let wanted = WantedPoles::new(response, observer)
+            .with_integrator(poles.integrator != 0)
+            .with_cancelled_zeros(poles.cancel_zeros != 0);
         let place = memory::follow(law)?.cast_mut();
         *place = (size.place)(a, b, &wanted)?;
         Ok(())

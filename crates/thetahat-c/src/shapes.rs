@@ -1,8 +1,9 @@
 //! Arrays of C as vectors and matrices: matrices stand row by row, as `m[rows][columns]` does.
 
-use thetahat_core::nalgebra::{ArrayStorage, SMatrix, SVector};
+use thetahat_core::Covariance;
+use thetahat_core::nalgebra::{ArrayStorage, Const, SMatrix, SVector};
 
-use crate::Number;
+use crate::{Error, Number};
 
 /// The vector with these elements; what is missing is 0.
 pub(crate) fn vector<const N: usize>(elements: &[Number]) -> SVector<Number, N> {
@@ -23,6 +24,13 @@ pub(crate) fn matrix<const R: usize, const C: usize>(
         }
     }
     SMatrix::from_data(ArrayStorage(columns))
+}
+
+/// The covariance with these entries; that of no noise if there are none.
+pub(crate) fn covariance<const N: usize>(
+    entries: Option<&[Number]>,
+) -> Result<Covariance<Number, Const<N>>, Error> {
+    Ok(entries.map_or(Ok(Covariance::zero(Const)), |entries| Covariance::new(&matrix(entries, N)))?)
 }
 
 /// Writes a vector, or as much of it as fits.

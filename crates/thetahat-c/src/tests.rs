@@ -56,14 +56,14 @@ fn ekf(memory: &mut Memory) -> *mut Ekf {
 #[test]
 fn every_error_has_a_name_and_a_text() {
     let mut names = std::collections::BTreeSet::new();
-    for code in 0..=Error::Other as i32 {
+    for code in 0..=Error::Inputs as i32 {
         names.insert(text(thetahat_error_name(code)));
         assert!(!text(thetahat_error_text(code)).is_empty());
     }
-    assert_eq!(names.len(), 22);
+    assert_eq!(names.len(), 23);
     assert_eq!(text(thetahat_error_name(Error::NotFinite as i32)), "NOT_FINITE");
     assert_eq!(text(thetahat_error_name(Error::Other as i32)), "OTHER");
-    for code in [-1, 22, i32::MAX, i32::MIN] {
+    for code in [-1, 23, i32::MAX, i32::MIN] {
         assert_eq!(text(thetahat_error_name(code)), "UNKNOWN");
         assert_eq!(text(thetahat_action_word(code)), "other");
     }
@@ -190,6 +190,12 @@ fn orders_and_learning_are_checked() {
     assert_eq!(init(&thetahat_arx_2, model, Learning { factor: 0.0, ..usual }), Error::OutOfRange);
     assert_eq!(init(&thetahat_arx_2, model, Learning { start: 3, ..usual }), Error::OutOfRange);
     assert_eq!(init(&thetahat_arx_2, model, Learning { dead_zone: -1.0, ..usual }), Error::OutOfRange);
+    for (outliers, threshold, release) in [(3, 9.0, 0), (1, 0.5, 0), (2, Number::NAN, 0), (2, 9.0, 65_536)] {
+        let wrong = Learning { outliers, threshold, release, ..usual };
+        assert_eq!(init(&thetahat_arx_2, model, wrong), Error::OutOfRange);
+    }
+    let robust = Learning { outliers: Outliers::Gate as i32, threshold: 25.0, release: 10, ..usual };
+    assert_eq!(init(&thetahat_arx_2, model, robust), Error::None);
     let mixed = Learning { start: Start::Mixed as i32, blend: 65_536, ..usual };
     assert_eq!(init(&thetahat_arx_2, model, mixed), Error::OutOfRange);
     assert_eq!(init(&thetahat_arx_2, model, Learning { blend: 10, ..mixed }), Error::None);
@@ -307,6 +313,110 @@ fn a_filter_asks_for_its_model_and_checks_it() {
     }
 }
 
+#[test]
+fn what_is_set_while_it_runs_is_set_or_changes_nothing() {
+    let (identity, indefinite) = ([1.0, 0.0, 0.0, 1.0], [1.0, 2.0, 2.0, 1.0]);
+    let (zeros, not_finite) = ([0.0; 2], [Number::NAN; 2]);
+    let mut found = [0.0; 4];
+    macro_rules! check_filter {
+        ($init:ident, $size:ident, $set_state:ident, $set_covariance:ident, $widen:ident, $state:ident, $covariance:ident) => {
+            let (mut memory, mut filter) = (Memory::new(), null_mut());
+            // SAFETY: pointers are null or valid.
+            unsafe {
+                let (start, prior) = (memory.start(), identity.as_ptr());
+                let code = $init(&raw mut filter, start, Memory::BYTES, &$size, zeros.as_ptr(), prior);
+                assert_eq!(code, Error::None);
+                let before = memory.0;
+                assert_eq!($set_state(filter, null()), Error::NullPointer);
+                assert_eq!($set_state(filter, not_finite.as_ptr()), Error::NotFinite);
+                assert_eq!($set_covariance(filter, indefinite.as_ptr()), Error::NotPositive);
+                assert_eq!($widen(filter, 0.5), Error::OutOfRange);
+                assert_eq!($widen(null_mut(), 2.0), Error::NullPointer);
+                assert!(memory.0 == before);
+                assert_eq!($set_state(filter, ONES.as_ptr()), Error::None);
+                assert_eq!($state(filter, found.as_mut_ptr()), Error::None);
+                assert_eq!(found[..2], [1.0, 1.0]);
+                assert_eq!($widen(filter, 4.0), Error::None);
+                assert_eq!($covariance(filter, found.as_mut_ptr()), Error::None);
+                assert_eq!(found, [4.0, 0.0, 0.0, 4.0]);
+                assert_eq!($set_covariance(filter, null()), Error::None);
+                assert_eq!($covariance(filter, found.as_mut_ptr()), Error::None);
+                assert_eq!(found, [0.0; 4]);
+            }
+        };
+    }
+    check_filter!(
+        thetahat_kalman_init,
+        thetahat_kalman_2_1,
+        thetahat_kalman_set_state,
+        thetahat_kalman_set_covariance,
+        thetahat_kalman_widen,
+        thetahat_kalman_state,
+        thetahat_kalman_covariance
+    );
+    check_filter!(
+        thetahat_ekf_init,
+        thetahat_ekf_2_1,
+        thetahat_ekf_set_state,
+        thetahat_ekf_set_covariance,
+        thetahat_ekf_widen,
+        thetahat_ekf_state,
+        thetahat_ekf_covariance
+    );
+    let (mut memory, mut observer) = (Memory::new(), null_mut());
+    let (start, zero) = (memory.start(), zeros.as_ptr());
+    // SAFETY: pointers are null or valid.
+    unsafe {
+        let code = thetahat_luenberger_init(
+            &raw mut observer,
+            start,
+            Memory::BYTES,
+            &thetahat_luenberger_2_1,
+            zero,
+            null(),
+        );
+        assert_eq!(code, Error::None);
+        assert_eq!(thetahat_luenberger_set_state(observer, not_finite.as_ptr()), Error::NotFinite);
+        assert_eq!(thetahat_luenberger_set_state(observer, ONES.as_ptr()), Error::None);
+        assert_eq!(thetahat_luenberger_state(observer, found.as_mut_ptr()), Error::None);
+    }
+    assert_eq!(found[..2], [1.0, 1.0]);
+}
+
+#[test]
+fn an_estimator_is_widened_or_stays() {
+    let (identity, indefinite) = ([1.0, 0.0, 0.0, 1.0], [1.0, 2.0, 2.0, 1.0]);
+    let mut found = [0.0; 4];
+    let mut memory = Memory::new();
+    let rls = rls(&mut memory);
+    let (mut second, mut arx) = (Memory::new(), null_mut());
+    let start = second.start();
+    // SAFETY: pointers are null or valid.
+    unsafe {
+        let before = memory.0;
+        assert_eq!(thetahat_rls_set_covariance(rls, null()), Error::NullPointer);
+        assert_eq!(thetahat_rls_set_covariance(rls, indefinite.as_ptr()), Error::NotPositive);
+        assert_eq!(thetahat_rls_widen(rls, Number::NAN), Error::OutOfRange);
+        assert!(memory.0 == before);
+        assert_eq!(thetahat_rls_set_covariance(rls, identity.as_ptr()), Error::None);
+        assert_eq!(thetahat_rls_widen(rls, 9.0), Error::None);
+        assert_eq!(thetahat_rls_covariance(rls, found.as_mut_ptr()), Error::None);
+        assert_eq!(found, [9.0, 0.0, 0.0, 9.0]);
+
+        let code =
+            thetahat_arx_init(&raw mut arx, start, Memory::BYTES, &thetahat_arx_2, &FIRST_ORDER, null());
+        assert_eq!(code, Error::None);
+        let before = second.0;
+        assert_eq!(thetahat_arx_set_covariance(arx, indefinite.as_ptr()), Error::NotPositive);
+        assert_eq!(thetahat_arx_widen(arx, 0.0), Error::OutOfRange);
+        assert!(second.0 == before);
+        assert_eq!(thetahat_arx_set_covariance(arx, identity.as_ptr()), Error::None);
+        assert_eq!(thetahat_arx_widen(arx, 4.0), Error::None);
+        assert_eq!(thetahat_arx_covariance(arx, found.as_mut_ptr()), Error::None);
+        assert_eq!(found, [4.0, 0.0, 0.0, 4.0]);
+    }
+}
+
 unsafe extern "C" fn identity(state: *const Number, value: *mut Number, _: *mut c_void) {
     // SAFETY: a filter with two states gives both.
     unsafe { value.copy_from(state, 2) };
@@ -402,6 +512,70 @@ fn observers_detectors_and_controllers_check_what_they_get() {
     }
 }
 
+/// A filter of two states and one output, which starts at 0.
+fn kalman(memory: &mut Memory) -> *mut Kalman {
+    let (mut kalman, zeros) = (null_mut(), [0.0; 2]);
+    let (start, bytes, ones) = (memory.start(), Memory::BYTES, [1.0, 0.0, 0.0, 1.0]);
+    let size = &raw const thetahat_kalman_2_1;
+    // SAFETY: all is as the interface asks for.
+    let code =
+        unsafe { thetahat_kalman_init(&raw mut kalman, start, bytes, size, zeros.as_ptr(), ones.as_ptr()) };
+    assert_eq!(code, Error::None);
+    kalman
+}
+
+#[test]
+fn a_direct_term_belongs_to_the_inputs_of_the_transition() {
+    let (unit, nothing, direct) = ([1.0, 0.0, 0.0, 1.0], [0.0; 8], [2.0, 3.0]);
+    let (f, g, h, d, r) = (unit.as_ptr(), nothing.as_ptr(), unit.as_ptr(), direct.as_ptr(), unit.as_ptr());
+    let mut memory = Memory::new();
+    let filter = kalman(&mut memory);
+    let mut innovation = core::mem::MaybeUninit::<Innovation>::uninit();
+    let told = innovation.as_mut_ptr();
+    // SAFETY: pointers are null or valid; the innovation is read after it was written.
+    unsafe {
+        // The transition, which says how many inputs there are, is not there yet, or has none.
+        let before = memory.0;
+        assert_eq!(thetahat_kalman_set_observation(filter, h, d, r), Error::Inputs);
+        assert!(memory.0 == before);
+        assert_eq!(thetahat_kalman_set_transition(filter, f, null(), 0, null()), Error::None);
+        assert_eq!(thetahat_kalman_set_observation(filter, h, d, r), Error::Inputs);
+        assert_eq!(thetahat_kalman_set_observation(filter, h, null(), r), Error::None);
+        assert_eq!(thetahat_kalman_set_transition(filter, f, g, 1, null()), Error::None);
+        assert_eq!(thetahat_kalman_set_observation(filter, h, d, r), Error::None);
+        // y = D u, so that there is nothing new; it stays so while D does.
+        let (u, y) = ([10.0, 7.0], [20.0]);
+        for transition in 0..2 {
+            assert_eq!(thetahat_kalman_correct(filter, u.as_ptr(), y.as_ptr(), told), Error::None);
+            assert_eq!((*told).error[0], 0.0, "{transition}");
+            let before = memory.0;
+            for inputs in [0, 2, 3] {
+                assert_eq!(thetahat_kalman_set_transition(filter, f, g, inputs, null()), Error::Inputs);
+            }
+            assert!(memory.0 == before);
+            assert_eq!(thetahat_kalman_set_transition(filter, f, g, 1, null()), Error::None);
+        }
+        // Without D the number may change, and D is set for the new one.
+        assert_eq!(thetahat_kalman_set_observation(filter, h, null(), r), Error::None);
+        assert_eq!(thetahat_kalman_set_transition(filter, f, g, 2, null()), Error::None);
+        assert_eq!(thetahat_kalman_set_observation(filter, h, d, r), Error::None);
+        assert_eq!(thetahat_kalman_correct(filter, u.as_ptr(), [41.0].as_ptr(), told), Error::None);
+        assert_eq!((*told).error[0], 0.0);
+
+        let (mut observer, size) = (null_mut(), &raw const thetahat_luenberger_2_1);
+        let (start, bytes) = (memory.start(), Memory::BYTES);
+        assert_eq!(thetahat_luenberger_init(&raw mut observer, start, bytes, size, g, null()), Error::None);
+        assert_eq!(thetahat_luenberger_set_observation(observer, h, d), Error::Inputs);
+        assert_eq!(thetahat_luenberger_set_transition(observer, f, g, 1), Error::None);
+        assert_eq!(thetahat_luenberger_set_observation(observer, h, d), Error::None);
+        assert_eq!(thetahat_luenberger_set_transition(observer, f, g, 2), Error::Inputs);
+        assert_eq!(thetahat_luenberger_update(observer, u.as_ptr(), y.as_ptr(), told), Error::None);
+        assert_eq!((*told).error[0], 0.0);
+    }
+    let said = text(thetahat_error_text(Error::Inputs as i32));
+    assert!(said.contains("set the transition first, then the observation with its D; before the"), "{said}");
+}
+
 #[test]
 fn a_tuner_checks_what_it_is_asked_for() {
     let (mut memory, mut tuner) = (Memory::new(), null_mut());
@@ -430,6 +604,10 @@ fn a_tuner_checks_what_it_is_asked_for() {
     assert_eq!(init(TunerWish { frequency: 0.0, ..usual }), Error::OutOfRange);
     assert_eq!(init(TunerWish { amplitude: -1.0, ..usual }), Error::OutOfRange);
     assert_eq!(init(TunerWish { longest_gap: 65_536, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { fallback: 3, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { fallback: 2, fallback_input: Number::NAN, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { refused: 65_536, ..usual }), Error::OutOfRange);
+    assert_eq!(init(TunerWish { innovations: 0.5, ..usual }), Error::OutOfRange);
     assert_eq!(init(TunerWish { output_scale: 0.0, ..usual }), Error::OutOfRange);
     assert_eq!(init(usual), Error::None);
     // SAFETY: pointers are null or valid.
@@ -437,5 +615,53 @@ fn a_tuner_checks_what_it_is_asked_for() {
         assert_eq!(thetahat_tuner_control(tuner, 1.0, 1.0, null_mut()), Error::NullPointer);
         assert_eq!(thetahat_tuner_probe(tuner, 2.0, 10), Error::OutOfRange);
         assert_eq!(thetahat_tuner_read(tuner, null_mut(), null_mut()), Error::None);
+        assert_eq!(thetahat_tuner_trusted(tuner, null_mut(), null_mut(), null_mut()), Error::None);
+        assert_eq!(thetahat_tuner_set_gain_sign(tuner, Number::NAN), Error::OutOfRange);
+        assert_eq!(thetahat_tuner_set_fallback(tuner, 9, 0.0), Error::OutOfRange);
+        assert_eq!(thetahat_tuner_set_fallback(tuner, Fallback::Input as i32, 2.5), Error::None);
+    }
+}
+
+/// A tuner with a sign that is wrong says so, and does what was chosen for that; with another sign it controls.
+#[test]
+fn a_tuner_says_that_it_is_not_trusted() {
+    let (mut memory, mut tuner) = (Memory::new(), null_mut());
+    let (start, bytes) = (memory.start(), Memory::BYTES);
+    let mut wish = core::mem::MaybeUninit::<TunerWish>::uninit();
+    // SAFETY: all pointers are valid; the wish is read after it was written.
+    unsafe {
+        assert_eq!(thetahat_tuner_usual(wish.as_mut_ptr(), 1.0, 1.0, -4.0, 4.0), Error::None);
+        let wish = TunerWish {
+            frequency: 0.5,
+            gain_sign: -1.0,
+            fallback: Fallback::Input as i32,
+            fallback_input: 1.0,
+            ..wish.assume_init()
+        };
+        let size = &raw const thetahat_indirect_1_1;
+        let made = thetahat_tuner_init(&raw mut tuner, start, bytes, size, &raw const wish, null());
+        assert_eq!(made, Error::None);
+        let (mut y, mut u): (Number, Number) = (0.0, 0.0);
+        let (mut state, mut why, mut age) = (0, 0, 0);
+        let mut told = core::mem::MaybeUninit::<Innovation>::uninit();
+        for k in 0..800 {
+            if k == 400 {
+                assert_eq!(thetahat_tuner_set_gain_sign(tuner, 1.0), Error::None);
+            }
+            y = 0.75 * y + 0.5 * u + 0.01 * (k % 7) as Number;
+            assert_eq!(thetahat_tuner_control(tuner, 1.0, y, &raw mut u), Error::None);
+            if k == 399 {
+                assert_eq!(thetahat_tuner_read(tuner, &raw mut state, null_mut()), Error::None);
+                let read = thetahat_tuner_trusted(tuner, &raw mut why, told.as_mut_ptr(), &raw mut age);
+                assert_eq!(read, Error::None);
+                assert_eq!((state, why), (TunerState::Distrusted as i32, Distrust::Sign as i32));
+                assert!((u - 1.0).abs() < 0.11 && age == 400 && told.assume_init().outputs == 1);
+            }
+        }
+        assert_eq!(thetahat_tuner_trusted(tuner, &raw mut why, null_mut(), &raw mut age), Error::None);
+        assert_eq!((why, age), (Distrust::None as i32, 0));
+        assert!((y - 1.0).abs() < 0.2, "{y}");
+        assert_eq!(thetahat_tuner_trust(tuner), Error::None);
+        assert_eq!(thetahat_tuner_trust(null_mut()), Error::NullPointer);
     }
 }

@@ -2,15 +2,16 @@
 
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    DirectOrders, DirectSelfTuner, IndirectSelfTuner, Probing, ResponseWanted, Sensor, TunerOrders,
-    TunerSettings, TunerState as CoreState,
+    DirectOrders, DirectSelfTuner, Distrust as CoreDistrust, Fallback as CoreFallback, IndirectSelfTuner,
+    Innovation as CoreInnovation, Probing, ResponseWanted, Sensor, Supervision, TunerOrders, TunerSettings,
+    TunerState as CoreState,
 };
 
 use crate::error::code;
 use crate::learning::Learning;
 use crate::memory::{self, Kind, Made, Place, View, Word};
 use crate::shapes::write;
-use crate::{Error, Number};
+use crate::{Error, Innovation, Number};
 
 /// What a self-tuner did in a sample.
 #[repr(i32)]
@@ -24,8 +25,66 @@ pub enum TunerState {
     Bridging = 2,
     /// The sensor says nothing for long: the input stays as it was.
     Holding = 3,
+    /// It is not trusted: the fallback acts. `thetahat_tuner_trusted` says why.
+    Distrusted = 4,
     /// Another state of the core.
-    Other = 4,
+    Other = 5,
+}
+
+/// Why a self-tuner is not trusted.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Distrust {
+    /// It is trusted.
+    None = 0,
+    /// The gain of the model has another sign than was given, or than was known.
+    Sign = 1,
+    /// The input goes from one limit to the other while the set point stays.
+    Saturated = 2,
+    /// No controller was designed for long.
+    Age = 3,
+    /// No controller was designed for long: none of those that are tried has margins that are bearable.
+    Margin = 4,
+    /// The model predicts worse than the latest measurement does.
+    Innovations = 5,
+    /// Another reason of the core.
+    Other = 6,
+}
+
+impl From<Option<CoreDistrust>> for Distrust {
+    fn from(distrust: Option<CoreDistrust>) -> Self {
+        match distrust {
+            None => Distrust::None,
+            Some(CoreDistrust::Sign) => Distrust::Sign,
+            Some(CoreDistrust::Saturated) => Distrust::Saturated,
+            Some(CoreDistrust::Age) => Distrust::Age,
+            Some(CoreDistrust::Margin) => Distrust::Margin,
+            Some(CoreDistrust::Innovations) => Distrust::Innovations,
+            Some(_) => Distrust::Other,
+        }
+    }
+}
+
+/// What acts while a self-tuner is not trusted.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fallback {
+    /// An input that stays: the mean of the inputs in the latest 64 sound samples.
+    Hold = 0,
+    /// The controller of the latest 64 sound samples.
+    LastGood = 1,
+    /// An input that is given.
+    Input = 2,
+}
+
+/// A `thetahat_fallback`, and the input of the last of them.
+fn fallback(fallback: i32, input: Number) -> Result<CoreFallback<Number>, Error> {
+    match fallback {
+        kind if kind == Fallback::Hold as i32 => Ok(CoreFallback::Hold),
+        kind if kind == Fallback::LastGood as i32 => Ok(CoreFallback::LastGood),
+        kind if kind == Fallback::Input as i32 => Ok(CoreFallback::Input(input)),
+        _ => Err(Error::OutOfRange),
+    }
 }
 
 impl From<CoreState> for TunerState {
@@ -35,6 +94,7 @@ impl From<CoreState> for TunerState {
             CoreState::Controlling => TunerState::Controlling,
             CoreState::Bridging => TunerState::Bridging,
             CoreState::Holding => TunerState::Holding,
+            CoreState::Distrusted(_) => TunerState::Distrusted,
             _ => TunerState::Other,
         }
     }
@@ -74,6 +134,22 @@ pub struct TunerWish {
     pub stuck_after: u32,
     /// For so many missing samples in a row the controller goes on with what its model predicts, up to 65535.
     pub longest_gap: u32,
+    /// What acts while the tuner is not trusted, a `thetahat_fallback`.
+    pub fallback: i32,
+    /// The input of THETAHAT_FALLBACK_INPUT.
+    pub fallback_input: Number,
+    /// The amplitude that excites the plant then, in the unit of the input. With 0 trust may not come back by itself.
+    pub excitation: Number,
+    /// The largest mean share of samples in which the input is at a limit, at both of them while the set point stays, 0
+    /// ... 1; 1 for any.
+    pub saturated: Number,
+    /// For so many samples in a row a design may be refused, a quarter of it where the sign is surely wrong, up to
+    /// 65535; 0 for any.
+    pub refused: u32,
+    /// The largest ratio of the mean squared innovation to the mean squared change of the measurement, 1 or more.
+    pub innovations: Number,
+    /// Whether the fallback acts too where the design is only old, 0 or 1: with 0 the controller goes on.
+    pub replace_old: u32,
 }
 
 impl TunerWish {
@@ -101,6 +177,14 @@ impl TunerWish {
                 stuck_after: few(self.stuck_after)?,
                 longest_gap: few(self.longest_gap)?,
                 ..Sensor::default()
+            },
+            supervision: Supervision {
+                fallback: fallback(self.fallback, self.fallback_input)?,
+                excitation: self.excitation,
+                saturated: self.saturated,
+                refused: few(self.refused)?,
+                innovations: self.innovations,
+                replace_old: self.replace_old != 0,
             },
         })
     }
@@ -173,6 +257,10 @@ pub(crate) trait Tuning {
     fn probe(&mut self, share: Number, samples: u32) -> Result<(), Error>;
     fn set_adaptation(&mut self, on: bool);
     fn state(&self) -> CoreState;
+    fn trusted(&self) -> (Option<CoreDistrust>, CoreInnovation<Number>, u32);
+    fn trust(&mut self);
+    fn set_gain_sign(&mut self, sign: Number) -> Result<(), Error>;
+    fn set_fallback(&mut self, fallback: CoreFallback<Number>) -> Result<(), Error>;
     fn parameters(&self) -> &[Number];
 }
 
@@ -195,6 +283,22 @@ impl<const P: usize, const C: usize> Tuning for Indirect<P, C> {
 
     fn state(&self) -> CoreState {
         self.state()
+    }
+
+    fn trusted(&self) -> (Option<CoreDistrust>, CoreInnovation<Number>, u32) {
+        (self.distrust(), self.innovation(), self.design_age())
+    }
+
+    fn trust(&mut self) {
+        self.trust();
+    }
+
+    fn set_gain_sign(&mut self, sign: Number) -> Result<(), Error> {
+        Ok(self.set_gain_sign(sign)?)
+    }
+
+    fn set_fallback(&mut self, fallback: CoreFallback<Number>) -> Result<(), Error> {
+        Ok(self.set_fallback(fallback)?)
     }
 
     fn parameters(&self) -> &[Number] {
@@ -221,6 +325,22 @@ impl<const P: usize, const C: usize, const S: usize> Tuning for Direct<P, C, S> 
 
     fn state(&self) -> CoreState {
         self.state()
+    }
+
+    fn trusted(&self) -> (Option<CoreDistrust>, CoreInnovation<Number>, u32) {
+        (self.distrust(), self.innovation(), self.design_age())
+    }
+
+    fn trust(&mut self) {
+        self.trust();
+    }
+
+    fn set_gain_sign(&mut self, sign: Number) -> Result<(), Error> {
+        Ok(self.set_gain_sign(sign)?)
+    }
+
+    fn set_fallback(&mut self, fallback: CoreFallback<Number>) -> Result<(), Error> {
+        Ok(self.set_fallback(fallback)?)
     }
 
     fn parameters(&self) -> &[Number] {
@@ -265,9 +385,11 @@ fn init_direct<
     place.write(tuner)
 }
 
-/// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with damping 0.9, an
-/// observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain, probing with a tenth of
-/// the scale to twice, any range of the sensor, never stuck, 100 missing samples from the model.
+/// Fills in what is usual, for these scales, and ends of the actuator's range: a response of 0.1 rad a sample with
+/// damping 0.9, an observer of 0.5, the input 0 or the nearest end of the range at first, nothing known of the gain,
+/// probing with a tenth of the scale to twice, any range of the sensor, never stuck, 100 missing samples from the
+/// model. Where it is not trusted the input is held, and excited by a tenth of the scale; for that half of the samples
+/// are at the limits, 200 designs refused, or innovations twice the changes.
 ///
 /// Errors: NULL_POINTER.
 #[unsafe(no_mangle)]
@@ -281,7 +403,7 @@ pub unsafe extern "C" fn thetahat_tuner_usual(
     code(|| {
         let place = memory::follow(wish)?.cast_mut();
         let response = ResponseWanted { frequency: 0.1, damping: 0.9, observer: 0.5 };
-        let TunerSettings { limits, input, gain_sign, probing, sensor, .. } =
+        let TunerSettings { limits, input, gain_sign, probing, sensor, supervision, .. } =
             TunerSettings::new(response, lowest_input..=highest_input, input_scale);
         *place = TunerWish {
             frequency: response.frequency,
@@ -299,6 +421,13 @@ pub unsafe extern "C" fn thetahat_tuner_usual(
             highest_measurement: *sensor.range.end(),
             stuck_after: sensor.stuck_after.into(),
             longest_gap: sensor.longest_gap.into(),
+            fallback: Fallback::Hold as i32,
+            fallback_input: input,
+            excitation: supervision.excitation,
+            saturated: supervision.saturated,
+            refused: supervision.refused.into(),
+            innovations: supervision.innovations,
+            replace_old: supervision.replace_old.into(),
         };
         Ok(())
     })
@@ -311,8 +440,8 @@ pub unsafe extern "C" fn thetahat_tuner_usual(
 ///   bytes.
 /// - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
 /// - wish: what is asked for.
-/// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. Exponential forgetting
-///   with 0.98, or 0.99 for slow changes, tracks well.
+/// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. The random
+///   walk with a variance of 1e-4 tracks best, where the scales are right; else exponential forgetting with 0.98.
 ///
 /// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a number of the wish or of the policy is out of its range.
 #[unsafe(no_mangle)]
@@ -401,4 +530,51 @@ pub unsafe extern "C" fn thetahat_tuner_read(
         memory::answer(state, TunerState::from(tuner.state()) as i32);
         Ok(())
     })
+}
+
+/// Reads whether it is trusted. Each of the places may be NULL.
+///
+/// - distrust: why it is not, a `thetahat_distrust`.
+/// - innovation: what the latest measurement told the model.
+/// - design_age: the samples since the latest design that was accepted.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_tuner_trusted(
+    tuner: *const Tuner,
+    distrust: *mut i32,
+    innovation: *mut Innovation,
+    design_age: *mut u32,
+) -> Error {
+    code(|| {
+        let (reason, told, age) = memory::read(tuner)?.trusted();
+        memory::answer(distrust, Distrust::from(reason) as i32);
+        memory::answer(innovation, told.into());
+        memory::answer(design_age, age);
+        Ok(())
+    })
+}
+
+/// Trusts it from now on: the controller acts, or the plant is excited until there is one. It comes back by itself
+/// where the model is good again; this is for a user who knows better.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_tuner_trust(tuner: *mut Tuner) -> Error {
+    code(|| {
+        memory::open(tuner)?.trust();
+        Ok(())
+    })
+}
+
+/// Says that the gain of the plant has this sign from now on, or 0 that it is not known.
+///
+/// Errors: OUT_OF_RANGE if it is not finite.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_tuner_set_gain_sign(tuner: *mut Tuner, sign: Number) -> Error {
+    code(|| memory::open(tuner)?.set_gain_sign(sign))
+}
+
+/// What acts from now on while it is not trusted: a `thetahat_fallback`, and the input of THETAHAT_FALLBACK_INPUT.
+///
+/// Errors: OUT_OF_RANGE if it is none, or that input is not finite.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn thetahat_tuner_set_fallback(tuner: *mut Tuner, kind: i32, input: Number) -> Error {
+    code(|| memory::open(tuner)?.set_fallback(fallback(kind, input)?))
 }

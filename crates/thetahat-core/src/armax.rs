@@ -6,11 +6,11 @@ use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
-use crate::rls::check_limits;
+use crate::rls::{check_limits, pass_on_settings};
 use crate::stability::{is_stable, move_stably};
 use crate::ud::{copy, dot};
 use crate::{
-    Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
+    Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
     RecursiveLeastSquares, RlsStart,
 };
 
@@ -53,6 +53,17 @@ impl<'a> ArmaxOrders<'a> {
 }
 
 /// Along which gradient a [`RecursiveArmax`] corrects.
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{ArmaxMethod, ArmaxOrders, Error, Forgetting, InputOrders, RecursiveArmax};
+///
+/// const ORDERS: ArmaxOrders = ArmaxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], nc: 1, constant: false };
+/// type Plant = RecursiveArmax<f32, Const<{ ORDERS.parameters() }>>;
+/// let plant = Plant::new(&ORDERS, ArmaxMethod::PredictionError, 5.0, &[1.0], 0.1, Forgetting::default())?;
+/// assert_eq!(plant.c().count(), 2); // 1 and c_1
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ArmaxMethod {
@@ -179,6 +190,24 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         })
     }
 
+    /// The same as [`new`](RecursiveArmax::new) for orders that are constants, so that wrong sizes do not compile: see
+    /// [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
+    pub fn of<O: ConstantOrders<ArmaxOrders<'static>>>(
+        method: ArmaxMethod,
+        output_scale: T,
+        input_scales: &[T],
+        noise_scale: T,
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        const {
+            assert!(
+                Self::fits(&O::ORDERS),
+                "N is not the number of parameters, or D is less than that of delays"
+            )
+        };
+        Self::new(&O::ORDERS, method, output_scale, input_scales, noise_scale, forgetting)
+    }
+
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
     /// Errors: [`Error::OutOfRange`] for any but the standard one with nc above 0: residuals are not known before parameters are.
@@ -189,39 +218,26 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         Ok(RecursiveArmax { estimator: self.estimator.with_start(start)?, ..self })
     }
 
-    /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
-    /// it has.
-    ///
-    /// Errors: also [`Error::OutOfRange`] if C is not stable.
-    pub fn with_parameters(mut self, parameters: OVector<T, N>) -> Result<Self, Error> {
-        self.estimator = self.estimator.with_parameters(parameters)?;
-        self.check_stable()?;
-        Ok(self)
-    }
-
-    /// That C is stable.
-    fn check_stable(&self) -> Result<(), Error> {
+    /// That C of these parameters is stable.
+    fn check_stable(&self, parameters: &[T]) -> Result<(), Error> {
         let mut c = self.gradients.shape_generic().0.vector(T::zero());
         let c = c.as_mut_slice().get_mut(..self.nc).unwrap_or_default();
-        copy(last(self.estimator.parameters().as_slice(), self.nc), c);
+        copy(last(parameters, self.nc), c);
         let range = "such that C(q) is stable";
         is_stable(c).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
     }
 
-    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
-    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveArmax { estimator: self.estimator.with_covariance(covariance)?, ..self })
-    }
-
     /// The same with a noise variance that is known from earlier samples. See
     /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
-    pub fn with_noise_variance(self, variance: T, samples: usize) -> Result<Self, Error> {
-        Ok(RecursiveArmax { estimator: self.estimator.with_noise_variance(variance, samples)?, ..self })
+    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
+        self.set_noise_variance(variance, samples)?;
+        Ok(self)
     }
 
     /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
-    pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
-        Ok(RecursiveArmax { estimator: self.estimator.with_dead_zone(width)?, ..self })
+    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
+        self.set_dead_zone(width)?;
+        Ok(self)
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -230,7 +246,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
     /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, the lines are not filled yet, or numbers
     /// that are accepted one by one would overflow together; and [`Projected`](Action::Projected) if the step was
-    /// shortened to keep C stable. (A variance may have been brought back to its bound in the same sample:
+    /// shortened to keep C stable. (A variance may be at its bound in the same sample:
     /// `Projected` comes before `Capped`.)
     ///
     /// Errors, after which nothing has changed, time included: as for
@@ -305,6 +321,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
                     return innovation;
                 };
                 let [variance] = variance;
+                // What is not used of an outlier does not come into the delay lines.
+                let output =
+                    output - estimator.unused(nis, action).map_or(T::zero(), |unused| error * unused);
                 innovation = Innovation { error, variance, nis, action };
                 let left = output - dot(regressor, estimator.parameters().as_slice());
                 let usable = left.is_finite() && !is_large(left, size.value());
@@ -321,6 +340,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             innovation
         });
         lags.push_checked(&[output]);
+        if let Some(unused) = estimator.unused(innovation.nis, innovation.action) {
+            lags.take_from_newest(|_| innovation.error * unused);
+        }
         lags.await_inputs(inputs_follow);
         innovation
     }
@@ -359,7 +381,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             let c = work.get_mut(..*nc).unwrap_or_default();
             copy(last(estimator.parameters().as_slice(), *nc), c);
             if out && !is_stable(c) {
-                estimator.set_parameters(before);
+                estimator.put_parameters(before);
                 estimator.cut_off(limits);
             }
             out
@@ -406,16 +428,26 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         self.residual = T::zero();
     }
 
-    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
-    /// so that predictions go on.
-    pub fn set_adaptation(&mut self, on: bool) {
-        self.estimator.set_adaptation(on);
+    /// Sets the parameters: see [`RecursiveLeastSquares::set_parameters`], whose errors it has.
+    ///
+    /// Errors: also [`Error::OutOfRange`] if C is not stable.
+    pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
+        self.estimator.check_parameters(&parameters)?;
+        self.check_stable(parameters.as_slice())?;
+        self.estimator.set_parameters(parameters)
     }
 
-    /// The least squares estimator: parameters, covariance, noise variance, excitation.
-    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N> {
-        &self.estimator
+    /// Sets the noise variance: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
+    pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
+        self.estimator.set_noise_variance(variance, samples)
     }
+
+    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
+    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
+        self.estimator.set_dead_zone(width)
+    }
+
+    pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
 }
 
 /// The last `count` numbers.

@@ -6,10 +6,11 @@ use nalgebra::{Const, OVector};
 
 use crate::error::check_length;
 use crate::lags::is_infinite;
+use crate::rls::pass_on_settings;
 use crate::triangle::column;
 use crate::ud::dot;
 use crate::{
-    Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, Lags, Real,
+    Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real,
     RecursiveLeastSquares, RlsStart, Solution,
 };
 
@@ -132,22 +133,55 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Ok(RecursiveArx { estimator: RecursiveLeastSquares::new(&scales, forgetting)?, lags })
     }
 
+    /// The same as [`new`](RecursiveArx::new) for orders that are constants: wrong sizes do not compile. (With `Dyn`, which has no
+    /// size to compare, they are made to fit.)
+    ///
+    /// Errors: those of `new` that are left, of the scales and the policy.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::Const;
+    /// use thetahat_core::{ArxOrders, ConstantOrders, Error, Forgetting, InputOrders, RecursiveArx};
+    ///
+    /// struct Heater;
+    /// impl ConstantOrders for Heater {
+    ///     const ORDERS: ArxOrders<'static> =
+    ///         ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+    /// }
+    /// let heater: RecursiveArx<f32, Const<2>> = RecursiveArx::of::<Heater>(20.0, &[50.0], Forgetting::default())?;
+    /// # Ok::<(), Error>(())
+    /// ```
+    ///
+    /// ```compile_fail,E0080
+    /// # use thetahat_core::nalgebra::Const;
+    /// # use thetahat_core::{ArxOrders, ConstantOrders, Error, Forgetting, InputOrders, RecursiveArx};
+    /// # struct Heater;
+    /// # impl ConstantOrders for Heater {
+    /// #     const ORDERS: ArxOrders<'static> =
+    /// #         ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+    /// # }
+    /// // One parameter too many.
+    /// let heater: RecursiveArx<f32, Const<3>> = RecursiveArx::of::<Heater>(20.0, &[50.0], Forgetting::default())?;
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn of<O: ConstantOrders>(
+        output_scale: T,
+        input_scales: &[T],
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        const {
+            assert!(
+                Self::fits(&O::ORDERS),
+                "N is not the number of parameters, or D is less than that of delays"
+            )
+        };
+        Self::new(&O::ORDERS, output_scale, input_scales, forgetting)
+    }
+
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
     /// Errors: none that can occur.
     pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
         Ok(RecursiveArx { estimator: self.estimator.with_start(start)?, ..self })
-    }
-
-    /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
-    /// it has.
-    pub fn with_parameters(self, parameters: OVector<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_parameters(parameters)?, ..self })
-    }
-
-    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
-    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_covariance(covariance)?, ..self })
     }
 
     /// The same started from a batch solution. See [`RecursiveLeastSquares::with_solution`], whose errors it has.
@@ -157,13 +191,15 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
 
     /// The same with a noise variance that is known from earlier samples. See
     /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
-    pub fn with_noise_variance(self, variance: T, samples: usize) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_noise_variance(variance, samples)?, ..self })
+    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
+        self.set_noise_variance(variance, samples)?;
+        Ok(self)
     }
 
     /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
-    pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_dead_zone(width)?, ..self })
+    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
+        self.set_dead_zone(width)?;
+        Ok(self)
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -222,6 +258,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         // What is too large here is so by what came before: time must go on, or it would stay.
         let taken =
             lags.sample(inputs, &[output], inputs_follow, |regressor| estimator.take(regressor, output).ok());
+        if let Some(Innovation { error, nis, action, .. }) = taken
+            && let Some(unused) = estimator.unused(nis, action)
+        {
+            lags.take_from_newest(|_| error * unused);
+        }
         taken.unwrap_or_else(|| {
             estimator.advance();
             Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
@@ -349,16 +390,22 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         self.lags.gap();
     }
 
-    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
-    /// so that predictions go on.
-    pub fn set_adaptation(&mut self, on: bool) {
-        self.estimator.set_adaptation(on);
+    /// Sets the parameters: see [`RecursiveLeastSquares::set_parameters`], whose errors it has.
+    pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
+        self.estimator.set_parameters(parameters)
     }
 
-    /// The least squares estimator: parameters, covariance, noise variance, excitation.
-    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N> {
-        &self.estimator
+    /// Sets the noise variance: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
+    pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
+        self.estimator.set_noise_variance(variance, samples)
     }
+
+    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
+    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
+        self.estimator.set_dead_zone(width)
+    }
+
+    pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
 }
 
 /// That no output is infinite, and that no sample is too large for a regressor of `size` such samples.

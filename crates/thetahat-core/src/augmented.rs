@@ -13,6 +13,36 @@ use crate::{Covariance, Dimension, Error, Observation, Real, Transition, ud};
 /// ```
 ///
 /// X is the number of states, P that of parameters, U that of inputs. [`Augmented`] makes a [`Transition`] of it.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, Matrix2, SVector, Vector1, Vector2};
+/// use thetahat_core::{Augmented, Covariance, Error, ParametricTransition, Transition};
+///
+/// /// A capacitor that leaks at an unknown rate: x(k+1) = θ x(k).
+/// struct Leak;
+/// type Numbers<'a> = &'a Vector1<f64>;
+/// type None<'a> = &'a SVector<f64, 0>;
+///
+/// impl ParametricTransition<f64, Const<1>, Const<1>> for Leak {
+///     fn next(&self, x: Numbers, rate: Numbers, _: None) -> Vector1<f64> {
+///         rate * x[0]
+///     }
+///     fn next_jacobian(&self, _: Numbers, rate: Numbers, _: None) -> Matrix1<f64> {
+///         *rate
+///     }
+///     fn next_parameter_jacobian(&self, x: Numbers, _: Numbers, _: None) -> Matrix1<f64> {
+///         *x
+///     }
+///     fn process_noise(&self, _: Numbers, _: Numbers, _: None) -> Covariance<f64, Const<1>> {
+///         Covariance::zero(Const)
+///     }
+/// }
+///
+/// let model: Augmented<_, f64, Const<2>, _, _> = Augmented::new(Leak, Const::<1>, Const::<1>)?;
+/// let found = model.next_jacobian(&Vector2::new(2.0, 0.9), &SVector::zeros());
+/// assert_eq!(found, Matrix2::new(0.9, 2.0, 0.0, 1.0));
+/// # Ok::<(), Error>(())
+/// ```
 pub trait ParametricTransition<
     T: Real,
     X: Dimension + Dimension<P>,
@@ -25,7 +55,7 @@ pub trait ParametricTransition<
     -> OVector<T, X>;
 
     /// ∂f/∂x, X x X.
-    fn state_jacobian(
+    fn next_jacobian(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -33,7 +63,7 @@ pub trait ParametricTransition<
     ) -> OMatrix<T, X, X>;
 
     /// ∂f/∂θ, X x P.
-    fn parameter_jacobian(
+    fn next_parameter_jacobian(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -41,7 +71,7 @@ pub trait ParametricTransition<
     ) -> OMatrix<T, X, P>;
 
     /// Q, the covariance of what the noise adds to the next state, X x X.
-    fn noise(
+    fn process_noise(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -57,6 +87,36 @@ pub trait ParametricTransition<
 ///
 /// X is the number of states, P that of parameters, M that of elements of a measurement, U that of inputs.
 /// [`Augmented`] makes an [`Observation`] of it. [`WithoutParameters`] makes one of an `Observation`.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, RowVector2, SVector, Vector1, Vector2};
+/// use thetahat_core::{Augmented, Covariance, Error, Observation, ParametricObservation};
+///
+/// /// A gauge with an unknown offset: y = x + θ.
+/// struct Gauge;
+/// type Numbers<'a> = &'a Vector1<f64>;
+/// type None<'a> = &'a SVector<f64, 0>;
+///
+/// impl ParametricObservation<f64, Const<1>, Const<1>, Const<1>> for Gauge {
+///     fn output(&self, x: Numbers, offset: Numbers, _: None) -> Vector1<f64> {
+///         x + offset
+///     }
+///     fn output_jacobian(&self, _: Numbers, _: Numbers, _: None) -> Matrix1<f64> {
+///         Matrix1::new(1.0)
+///     }
+///     fn output_parameter_jacobian(&self, _: Numbers, _: Numbers, _: None) -> Matrix1<f64> {
+///         Matrix1::new(1.0)
+///     }
+///     fn measurement_noise(&self, _: Numbers, _: Numbers, _: None) -> Covariance<f64, Const<1>> {
+///         Covariance::zero(Const)
+///     }
+/// }
+///
+/// let model: Augmented<_, f64, Const<2>, _, _> = Augmented::new(Gauge, Const::<1>, Const::<1>)?;
+/// let (z, none) = (Vector2::new(2.0, 0.5), SVector::zeros());
+/// assert_eq!((model.output(&z, &none), model.output_jacobian(&z, &none)), (Vector1::new(2.5), RowVector2::new(1.0, 1.0)));
+/// # Ok::<(), Error>(())
+/// ```
 pub trait ParametricObservation<
     T: Real,
     X: Dimension + Dimension<M>,
@@ -74,7 +134,7 @@ pub trait ParametricObservation<
     ) -> OVector<T, M>;
 
     /// ∂h/∂x, M x X.
-    fn state_jacobian(
+    fn output_jacobian(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -82,7 +142,7 @@ pub trait ParametricObservation<
     ) -> OMatrix<T, M, X>;
 
     /// ∂h/∂θ, M x P.
-    fn parameter_jacobian(
+    fn output_parameter_jacobian(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -90,7 +150,7 @@ pub trait ParametricObservation<
     ) -> OMatrix<T, M, P>;
 
     /// R, the covariance of what the noise adds to the measurement, M x M.
-    fn noise(
+    fn measurement_noise(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -99,6 +159,18 @@ pub trait ParametricObservation<
 }
 
 /// An observation that depends on no parameter, as a [`ParametricObservation`]: for [`Augmented`].
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, RowVector2, SVector, Vector2};
+/// use thetahat_core::{Augmented, Covariance, Error, LinearObservation, Observation, WithoutParameters};
+///
+/// let gauge = LinearObservation::new(Matrix1::new(3.0), Covariance::<f64, Const<1>>::zero(Const))?;
+/// let model: Augmented<_, f64, Const<2>, _, _> =
+///     Augmented::new(WithoutParameters(gauge), Const::<1>, Const::<1>)?;
+/// let found = model.output_jacobian(&Vector2::new(2.0, 0.5), &SVector::zeros());
+/// assert_eq!(found, RowVector2::new(3.0, 0.0)); // the parameter is not seen
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WithoutParameters<O>(pub O);
 
@@ -115,16 +187,16 @@ where
         self.0.output(state, input)
     }
 
-    fn state_jacobian(
+    fn output_jacobian(
         &self,
         state: &OVector<T, X>,
         _: &OVector<T, P>,
         input: &OVector<T, U>,
     ) -> OMatrix<T, M, X> {
-        self.0.jacobian(state, input)
+        self.0.output_jacobian(state, input)
     }
 
-    fn parameter_jacobian(
+    fn output_parameter_jacobian(
         &self,
         state: &OVector<T, X>,
         parameters: &OVector<T, P>,
@@ -134,8 +206,13 @@ where
         rows.rows_by(parameters.shape_generic().0, T::zero())
     }
 
-    fn noise(&self, state: &OVector<T, X>, _: &OVector<T, P>, input: &OVector<T, U>) -> Covariance<T, M> {
-        self.0.noise(state, input)
+    fn measurement_noise(
+        &self,
+        state: &OVector<T, X>,
+        _: &OVector<T, P>,
+        input: &OVector<T, U>,
+    ) -> Covariance<T, M> {
+        self.0.measurement_noise(state, input)
     }
 }
 
@@ -177,13 +254,13 @@ where
 ///     fn next(&self, x: Numbers, pole: Numbers, u: Numbers) -> Vector1<f64> {
 ///         Vector1::new(pole[0] * x[0] + u[0])
 ///     }
-///     fn state_jacobian(&self, _: Numbers, pole: Numbers, _: Numbers) -> Matrix1<f64> {
+///     fn next_jacobian(&self, _: Numbers, pole: Numbers, _: Numbers) -> Matrix1<f64> {
 ///         *pole
 ///     }
-///     fn parameter_jacobian(&self, x: Numbers, _: Numbers, _: Numbers) -> Matrix1<f64> {
+///     fn next_parameter_jacobian(&self, x: Numbers, _: Numbers, _: Numbers) -> Matrix1<f64> {
 ///         *x
 ///     }
-///     fn noise(&self, _: Numbers, _: Numbers, _: Numbers) -> Covariance<f64, Const<1>> {
+///     fn process_noise(&self, _: Numbers, _: Numbers, _: Numbers) -> Covariance<f64, Const<1>> {
 ///         Covariance::zero(Const)
 ///     }
 /// }
@@ -230,9 +307,16 @@ impl<A, T: Real, N: Dimension, X: Dimension, P: Dimension> Augmented<A, T, N, X,
     /// The same with parameters that walk at random: Q_θ is what each sample adds to their covariance.
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`).
-    pub fn with_walk(self, walk: Covariance<T, P>) -> Result<Self, Error> {
+    pub fn with_walk(mut self, walk: Covariance<T, P>) -> Result<Self, Error> {
+        self.set_walk(walk)?;
+        Ok(self)
+    }
+
+    /// Sets how the parameters walk: see [`with_walk`](Augmented::with_walk), whose errors it has.
+    pub fn set_walk(&mut self, walk: Covariance<T, P>) -> Result<(), Error> {
         check_length("walk", self.walk.size().value(), walk.size().value())?;
-        Ok(Augmented { walk, ..self })
+        self.walk = walk;
+        Ok(())
     }
 
     /// The model.
@@ -275,11 +359,11 @@ where
         next
     }
 
-    fn jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, N, N> {
+    fn next_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, N, N> {
         let (x, n) = (self.states.value(), self.size.value());
         let (states, parameters) = self.split(state);
-        let by_state = self.model.state_jacobian(&states, &parameters, input);
-        let by_parameter = self.model.parameter_jacobian(&states, &parameters, input);
+        let by_state = self.model.next_jacobian(&states, &parameters, input);
+        let by_parameter = self.model.next_parameter_jacobian(&states, &parameters, input);
         let mut jacobian = self.size.square(T::zero());
         for index in 0..n {
             let target = column_mut(jacobian.as_mut_slice(), n, index);
@@ -297,9 +381,13 @@ where
         jacobian
     }
 
-    fn noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, N> {
+    fn process_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, N> {
         let (states, parameters) = self.split(state);
-        Covariance::block_diagonal(self.size, &self.model.noise(&states, &parameters, input), &self.walk)
+        Covariance::block_diagonal(
+            self.size,
+            &self.model.process_noise(&states, &parameters, input),
+            &self.walk,
+        )
     }
 }
 
@@ -318,10 +406,10 @@ where
         self.model.output(&states, &parameters, input)
     }
 
-    fn jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N> {
+    fn output_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N> {
         let (states, parameters) = self.split(state);
-        let by_state = self.model.state_jacobian(&states, &parameters, input);
-        let by_parameter = self.model.parameter_jacobian(&states, &parameters, input);
+        let by_state = self.model.output_jacobian(&states, &parameters, input);
+        let by_parameter = self.model.output_parameter_jacobian(&states, &parameters, input);
         let mut jacobian = by_state.shape_generic().0.rows_by(self.size, T::zero());
         let columns = by_state.as_slice().iter().chain(by_parameter.as_slice());
         for (entry, &value) in jacobian.as_mut_slice().iter_mut().zip(columns) {
@@ -333,9 +421,9 @@ where
         jacobian
     }
 
-    fn noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, M> {
+    fn measurement_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, M> {
         let (states, parameters) = self.split(state);
-        self.model.noise(&states, &parameters, input)
+        self.model.measurement_noise(&states, &parameters, input)
     }
 }
 

@@ -19,6 +19,35 @@ use crate::{Error, Real};
 ///
 /// [`Polynomial`], [`Radial`], [`Spline`], [`Network`], [`Local`] and [`Neighbours`] are views of numbers that may stand in flash. Any other functions can be given by this
 /// trait; they are computed without a heap, and each is about 1 where z is, so that one prior serves all.
+///
+/// ```
+/// use thetahat_core::{Basis, Error};
+///
+/// /// 1 and a backlash of known width, as functions of z_0.
+/// struct DeadBand(f32);
+///
+/// impl Basis<f32> for DeadBand {
+///     fn functions(&self) -> usize {
+///         2
+///     }
+///     fn check(&self, regressors: usize) -> Result<(), Error> {
+///         if regressors > 0 { Ok(()) } else { Err(Error::Length { argument: "z", expected: 1, found: 0 }) }
+///     }
+///     fn each(&self, z: &[f32], mut take: impl FnMut(usize, f32)) {
+///         take(0, 1.0);
+///         take(1, z[0] - z[0].clamp(-self.0, self.0));
+///     }
+///     fn add_slopes(&self, parameters: &[f32], z: &[f32], slopes: &mut [f32]) {
+///         if z[0].abs() > self.0 {
+///             slopes[0] += parameters[1];
+///         }
+///     }
+/// }
+///
+/// let mut slopes = [0.0];
+/// DeadBand(0.5).add_slopes(&[1.0, 2.0], &[2.0], &mut slopes);
+/// assert_eq!((DeadBand(0.5).value(&[1.0, 2.0], &[2.0]), slopes), (4.0, [2.0]));
+/// ```
 pub trait Basis<T: Real> {
     /// How many functions there are.
     fn functions(&self) -> usize;

@@ -9,8 +9,8 @@ mod polynomial;
 mod rst;
 
 pub use adaptive::{
-    DirectOrders, DirectSelfTuner, IndirectSelfTuner, Probing, ResponseWanted, Sensor, TunerModel,
-    TunerOrders, TunerSettings, TunerState,
+    DirectOrders, DirectSelfTuner, Distrust, Fallback, IndirectSelfTuner, Probing, ResponseWanted, Sensor,
+    Supervision, TunerModel, TunerOrders, TunerSettings, TunerState,
 };
 pub use linear_quadratic::LinearQuadratic;
 pub use minimum_variance::{MinimumVariance, MinimumVarianceOrders};

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use nalgebra::{OMatrix, OVector};
+use nalgebra::{ArrayStorage, Const, OMatrix, OVector};
 
 use crate::dim::filled;
 use crate::error::{check_finite, check_length};
@@ -268,6 +268,22 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         if ud::has_finite_variances(sum.as_slice(), n) { Ok(sum) } else { Err(Error::Overflow) }
     }
 
+    /// The covariance `factor` P. It stays factored. n multiplications.
+    ///
+    /// Errors: [`Error::OutOfRange`] if the factor is not finite and at least 1; [`Error::Overflow`].
+    pub(crate) fn widened(&self, factor: T) -> Result<Self, Error> {
+        if !(factor >= T::one() && factor.is_finite()) {
+            return Err(Error::OutOfRange { argument: "factor", range: "finite and at least 1" });
+        }
+        let (n, mut wide) = (self.size().value(), self.clone());
+        for index in 0..n {
+            if let Some(variance) = column_mut(wide.as_mut_slice(), n, index).get_mut(index) {
+                *variance *= factor;
+            }
+        }
+        if ud::has_finite_variances(wide.as_slice(), n) { Ok(wide) } else { Err(Error::Overflow) }
+    }
+
     /// P, symmetric to the bit, n x n. n³/6 multiply-adds.
     pub fn matrix(&self) -> OMatrix<T, N, N> {
         let size = self.factor.shape_generic().0;
@@ -394,6 +410,50 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
         self.factor.shape_generic().0
     }
 }
+
+/// A covariance that is a constant, in single and in double precision.
+macro_rules! constant {
+    ($real:ty) => {
+        impl<const N: usize> Covariance<$real, Const<N>> {
+            /// Independent elements, with these variances, as a constant of the program. A wrong number does not compile, where the
+            /// constant panics for the error.
+            ///
+            /// Errors: [`Error::NotFinite`]; [`Error::Negative`].
+            ///
+            /// ```
+            /// use thetahat_core::Covariance;
+            /// use thetahat_core::nalgebra::Const;
+            ///
+            /// type Prior = Covariance<f32, Const<2>>;
+            /// const PRIOR: Prior = match Prior::constant([9.0, 1.0]) {
+            ///     Ok(prior) => prior,
+            ///     Err(_) => panic!("a variance is negative or not finite"),
+            /// };
+            /// assert_eq!(PRIOR.variances().as_slice(), [9.0, 1.0]);
+            /// ```
+            pub const fn constant(variances: [$real; N]) -> Result<Self, Error> {
+                let mut factor = [[0.0; N]; N];
+                let mut index = 0;
+                while index < N {
+                    let variance = variances[index];
+                    if !variance.is_finite() {
+                        return Err(Error::NotFinite { argument: "variances" });
+                    }
+                    if variance < 0.0 {
+                        return Err(Error::Negative { argument: "variances" });
+                    }
+                    factor[index][index] = variance;
+                    index += 1;
+                }
+                let factor = OMatrix::<$real, Const<N>, Const<N>>::from_array_storage(ArrayStorage(factor));
+                Ok(Covariance { factor })
+            }
+        }
+    };
+}
+
+constant!(f32);
+constant!(f64);
 
 /// What counts as nothing but rounding beside a variance.
 fn rounding<T: Real>(size: usize) -> T {

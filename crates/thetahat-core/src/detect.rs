@@ -5,7 +5,14 @@ use nalgebra::OVector;
 use crate::{Dimension, Innovation, Real};
 
 /// What a chart watches.
+///
+/// ```
+/// use thetahat_core::Chart;
+///
+/// assert_eq!(Chart::ALL.map(Chart::word), ["mean_up", "mean_down", "variance"]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(all(feature = "defmt", target_os = "none"), derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Chart {
     /// Whether the mean of the innovations has risen.
@@ -31,7 +38,19 @@ impl Chart {
 }
 
 /// What a chart says once it has passed its threshold.
+///
+/// ```
+/// use thetahat_core::{Action, ChangeDetector, Chart, Error, Innovation};
+///
+/// let mut detector = ChangeDetector::<f64>::new(6.0, 6.0)?;
+/// // All innovations are three standard deviations above 0.
+/// let innovation = Innovation::new(3.0, 1.0, 9.0, Action::Updated);
+/// let alarm = (0..10).find_map(|_| detector.update(&innovation)).expect("the mean has risen");
+/// assert_eq!((alarm.chart, alarm.samples), (Chart::MeanUp, 3)); // 3 · (3 - 1/2) is above 6
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(all(feature = "defmt", target_os = "none"), derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Alarm<T> {
     /// The chart that passed its threshold; if several did at once, the one that is furthest beyond its own.

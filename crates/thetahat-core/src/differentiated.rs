@@ -12,6 +12,25 @@ use crate::{Covariance, Dual, Number, Observation, Real, Transition};
 /// ```
 ///
 /// N is the number of states, W that of noises, U that of inputs. [`Differentiated`] makes a [`Transition`] of it.
+///
+/// ```
+/// use thetahat_core::nalgebra::{SVector, Vector1, Vector2};
+/// use thetahat_core::{Covariance, Differentiated, Error, Number, Transition, TransitionFunction};
+///
+/// /// A cart with friction, on which a random force acts: position and speed, every 0.1 s.
+/// struct Cart;
+///
+/// impl TransitionFunction<f64, 2, 1> for Cart {
+///     fn next<S: Number<f64>>(&self, [position, speed]: [S; 2], _: [S; 0], [force]: [S; 1]) -> [S; 2] {
+///         [position + speed * 0.1, speed * 0.9 + force * 0.1]
+///     }
+/// }
+///
+/// let cart = Differentiated::new(Cart, Covariance::from_diagonal(&Vector1::new(4.0))?);
+/// let noise = cart.process_noise(&Vector2::zeros(), &SVector::<f64, 0>::zeros());
+/// assert!((noise.variances() - Vector2::new(0.0, 0.04)).amax() < 1e-15);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait TransitionFunction<T: Real, const N: usize, const W: usize, const U: usize = 0> {
     /// f(x, u, w).
     fn next<S: Number<T>>(&self, state: [S; N], input: [S; U], noise: [S; W]) -> [S; N];
@@ -25,6 +44,25 @@ pub trait TransitionFunction<T: Real, const N: usize, const W: usize, const U: u
 ///
 /// N is the number of states, M that of elements of a measurement, V that of noises, U that of inputs.
 /// [`Differentiated`] makes an [`Observation`] of it.
+///
+/// ```
+/// use thetahat_core::nalgebra::{RowVector2, SVector, Vector1, Vector2};
+/// use thetahat_core::{Covariance, Differentiated, Error, Number, Observation, ObservationFunction};
+///
+/// /// The distance of a point from the origin, with an error of the sensor.
+/// struct Distance;
+///
+/// impl ObservationFunction<f64, 2, 1, 1> for Distance {
+///     fn output<S: Number<f64>>(&self, [x, y]: [S; 2], _: [S; 0], [error]: [S; 1]) -> [S; 1] {
+///         [(x * x + y * y).sqrt() + error]
+///     }
+/// }
+///
+/// let sensor = Differentiated::new(Distance, Covariance::from_diagonal(&Vector1::new(0.01))?);
+/// let found = sensor.output_jacobian(&Vector2::new(3.0, 4.0), &SVector::<f64, 0>::zeros());
+/// assert!((found - RowVector2::new(0.6, 0.8)).amax() < 1e-15);
+/// # Ok::<(), Error>(())
+/// ```
 pub trait ObservationFunction<T: Real, const N: usize, const M: usize, const V: usize, const U: usize = 0> {
     /// h(x, u, v).
     fn output<S: Number<T>>(&self, state: [S; N], input: [S; U], noise: [S; V]) -> [S; M];
@@ -136,13 +174,13 @@ where
         vector(self.function.next(numbers(state), numbers(input), [T::zero(); W]))
     }
 
-    fn jacobian(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> OMatrix<T, Const<N>, Const<N>> {
+    fn next_jacobian(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> OMatrix<T, Const<N>, Const<N>> {
         let next =
             self.function.next(Dual::variables(numbers(state)), constants(input), [T::zero().into(); W]);
         jacobian(next)
     }
 
-    fn noise(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> Covariance<T, Const<N>> {
+    fn process_noise(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> Covariance<T, Const<N>> {
         let next = self.function.next(constants(state), constants(input), Dual::variables([T::zero(); W]));
         entering(&self.noise, next)
     }
@@ -158,13 +196,17 @@ where
         vector(self.function.output(numbers(state), numbers(input), [T::zero(); V]))
     }
 
-    fn jacobian(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> OMatrix<T, Const<M>, Const<N>> {
+    fn output_jacobian(
+        &self,
+        state: &SVector<T, N>,
+        input: &SVector<T, U>,
+    ) -> OMatrix<T, Const<M>, Const<N>> {
         let output =
             self.function.output(Dual::variables(numbers(state)), constants(input), [T::zero().into(); V]);
         jacobian(output)
     }
 
-    fn noise(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> Covariance<T, Const<M>> {
+    fn measurement_noise(&self, state: &SVector<T, N>, input: &SVector<T, U>) -> Covariance<T, Const<M>> {
         let output =
             self.function.output(constants(state), constants(input), Dual::variables([T::zero(); V]));
         entering(&self.noise, output)

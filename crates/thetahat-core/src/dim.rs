@@ -186,7 +186,10 @@ impl Workspace for Dyn {
 }
 
 /// This matrix with these entries, which are as many.
-pub(crate) fn filled<T: Real, R: Dim, C: Dim>(mut matrix: OMatrix<T, R, C>, entries: &[T]) -> OMatrix<T, R, C>
+pub(crate) fn filled<T: Scalar + Copy, R: Dim, C: Dim>(
+    mut matrix: OMatrix<T, R, C>,
+    entries: &[T],
+) -> OMatrix<T, R, C>
 where
     DefaultAllocator: Allocator<R, C>,
 {

@@ -50,10 +50,10 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, KalmanFilter, Obse
 ///     fn next(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Vector2<f64> {
 ///         Vector2::new(x[0] + T * x[1], x[1] - T * 9.81 * x[0].sin())
 ///     }
-///     fn jacobian(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Matrix2<f64> {
+///     fn next_jacobian(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Matrix2<f64> {
 ///         Matrix2::new(1.0, T, -T * 9.81 * x[0].cos(), 1.0)
 ///     }
-///     fn noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<2>> {
+///     fn process_noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<2>> {
 ///         Covariance::zero(Const)
 ///     }
 /// }
@@ -62,10 +62,10 @@ use crate::{Action, Covariance, Dimension, Error, Innovation, KalmanFilter, Obse
 ///     fn output(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Vector1<f64> {
 ///         Vector1::new(x[0].sin())
 ///     }
-///     fn jacobian(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> SMatrix<f64, 1, 2> {
+///     fn output_jacobian(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> SMatrix<f64, 1, 2> {
 ///         SMatrix::<f64, 1, 2>::new(x[0].cos(), 0.0)
 ///     }
-///     fn noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<1>> {
+///     fn measurement_noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<1>> {
 ///         Covariance::from_diagonal(&Vector1::new(1e-4)).unwrap_or(Covariance::zero(Const))
 ///     }
 /// }
@@ -94,7 +94,7 @@ pub struct ExtendedKalmanFilter<T: Real, N: Dimension> {
 impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for ExtendedKalmanFilter<T, N> {
     /// The same filter, for models that need not be linear.
     fn from(linear: KalmanFilter<T, N>) -> Self {
-        ExtendedKalmanFilter { linear, iterations: 1 }
+        ExtendedKalmanFilter::around(linear)
     }
 }
 
@@ -106,11 +106,17 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         Ok(KalmanFilter::new(state, covariance)?.into())
     }
 
+    /// A filter around this one, as a constant for a `static`: see [`KalmanFilter::constant`].
+    pub const fn around(linear: KalmanFilter<T, N>) -> Self {
+        ExtendedKalmanFilter { linear, iterations: 1 }
+    }
+
     /// The same with a gate: see [`KalmanFilter::with_gate`].
     ///
     /// Errors: [`Error::OutOfRange`] if it is not above 0.
-    pub fn with_gate(self, gate: T) -> Result<Self, Error> {
-        Ok(ExtendedKalmanFilter { linear: self.linear.with_gate(gate)?, ..self })
+    pub fn with_gate(mut self, gate: T) -> Result<Self, Error> {
+        self.set_gate(gate)?;
+        Ok(self)
     }
 
     /// The same with a measurement update that is iterated: it linearises the observation `count` times, each
@@ -128,12 +134,9 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
     ///
     /// Source: Jazwinski 1970, section 8.3; Bell and Cathey, The iterated Kalman filter update as a Gauss-Newton
     /// method, 1993.
-    pub fn with_iterations(self, count: usize) -> Result<Self, Error> {
-        if count > 0 {
-            Ok(ExtendedKalmanFilter { iterations: count, ..self })
-        } else {
-            Err(Error::OutOfRange { argument: "iterations", range: "1 or more" })
-        }
+    pub fn with_iterations(mut self, count: usize) -> Result<Self, Error> {
+        self.set_iterations(count)?;
+        Ok(self)
     }
 
     /// The estimate of the state, x̂.
@@ -157,8 +160,49 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
     }
 
     /// The same with a gate that lets go: see [`KalmanFilter::with_release`].
-    pub fn with_release(self, count: u16) -> Self {
-        ExtendedKalmanFilter { linear: self.linear.with_release(count), ..self }
+    pub fn with_release(mut self, count: u16) -> Self {
+        self.set_release(count);
+        self
+    }
+
+    /// Puts the state where it is known to be: see [`KalmanFilter::set_state`], whose errors it has.
+    pub fn set_state(&mut self, state: OVector<T, N>) -> Result<(), Error> {
+        self.linear.set_state(state)
+    }
+
+    /// Sets P: see [`KalmanFilter::set_covariance`], whose errors it has.
+    pub fn set_covariance(&mut self, covariance: Covariance<T, N>) -> Result<(), Error> {
+        self.linear.set_covariance(covariance)
+    }
+
+    /// Takes P for larger by a factor: see [`KalmanFilter::widen`], whose errors it has.
+    pub fn widen(&mut self, factor: T) -> Result<(), Error> {
+        self.linear.widen(factor)
+    }
+
+    /// Takes P for larger by a sum: see [`KalmanFilter::widen_by`], whose errors it has.
+    pub fn widen_by(&mut self, covariance: &Covariance<T, N>) -> Result<(), Error> {
+        self.linear.widen_by(covariance)
+    }
+
+    /// Sets the gate: see [`KalmanFilter::with_gate`], whose errors it has.
+    pub fn set_gate(&mut self, gate: T) -> Result<(), Error> {
+        self.linear.set_gate(gate)
+    }
+
+    /// Sets when the gate lets go: see [`KalmanFilter::with_release`].
+    pub fn set_release(&mut self, count: u16) {
+        self.linear.set_release(count);
+    }
+
+    /// Sets how often a measurement update linearises: see [`with_iterations`](ExtendedKalmanFilter::with_iterations), whose
+    /// errors it has.
+    pub fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
+        if count == 0 {
+            return Err(Error::OutOfRange { argument: "iterations", range: "1 or more" });
+        }
+        self.iterations = count;
+        Ok(())
     }
 
     /// After how many measurements in a row the gate lets go; 0 if never.
@@ -205,8 +249,8 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         check_finite("input", input.as_slice())?;
         let (state, n) = (self.linear.state(), self.linear.state().len());
         let next = transition.next(state, input);
-        let state_matrix = transition.jacobian(state, input);
-        let noise = transition.noise(state, input);
+        let state_matrix = transition.next_jacobian(state, input);
+        let noise = transition.process_noise(state, input);
         check_entries("next state", next.as_slice(), n)?;
         check_length("transition Jacobian", n, state_matrix.nrows())?;
         check_entries("transition Jacobian", state_matrix.as_slice(), n * n)?;
@@ -297,8 +341,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Linearis
         measurement: &OVector<T, M>,
     ) -> Result<Self, Error> {
         let error = prediction_error(measurement, observation.output(state, input))?;
-        let output_matrix = observation.jacobian(state, input);
-        let noise = observation.noise(state, input);
+        let output_matrix = observation.output_jacobian(state, input);
+        let noise = observation.measurement_noise(state, input);
         let (n, m) = (state.len(), error.len());
         check_length("observation Jacobian", m, output_matrix.nrows())?;
         check_entries("observation Jacobian", output_matrix.as_slice(), n * m)?;

@@ -4,13 +4,28 @@ use crate::{Dimension, Real};
 use nalgebra::OVector;
 
 /// What an estimator did with a sample.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Vector1};
+/// use thetahat_core::{Action, Error, Forgetting, RecursiveLeastSquares};
+///
+/// let mut gain: RecursiveLeastSquares<f32, Const<1>> =
+///     RecursiveLeastSquares::new(&Vector1::new(1.0), Forgetting::default())?;
+/// match gain.update(&Vector1::new(1.0), f32::NAN)?.action {
+///     Action::Updated | Action::Capped => panic!("nothing was measured"),
+///     action => assert_eq!(action.word(), "missing"),
+/// }
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
+#[cfg_attr(all(feature = "defmt", target_os = "none"), derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Action {
     /// The estimate was corrected.
     Updated,
-    /// The estimate was corrected, and a variance that had grown to its bound was brought back to it.
+    /// The estimate was corrected, and a variance has grown to its bound: samples tell too little of some direction of the
+    /// parameters, and nothing is forgotten there. See [`Forgetting`](crate::Forgetting#the-bound).
     Capped,
     /// The estimate was corrected by less than the innovation asks for, so that C(q) or F(q) stays stable, or parameters stay
     /// within limits.
@@ -31,6 +46,9 @@ pub enum Action {
     /// It is above the gate, and so were those before it, so many in a row that the filter must be wrong and not they: the
     /// measurement was used.
     Released,
+    /// The innovation is an outlier: the estimate was corrected by less than it asks for. See
+    /// [`Outliers::Huber`](crate::Outliers::Huber).
+    Bounded,
 }
 
 impl Action {
@@ -51,6 +69,7 @@ impl Action {
             Action::Skipped => "skipped",
             Action::Gated => "gated",
             Action::Released => "released",
+            Action::Bounded => "bounded",
         }
     }
 }
@@ -69,7 +88,24 @@ impl Action {
 /// section 5.4).
 ///
 /// `E` is the type of a measurement: a number, or a vector.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+/// use thetahat_core::{Action, Covariance, Error, KalmanFilter, LinearObservation};
+///
+/// // A level of 2 with variance 3, a gauge with variance 1, and a measurement of 6: e = 4, S = 3 + 1.
+/// let variance = |value: f64| Covariance::<f64, Const<1>>::from_diagonal(&Vector1::new(value));
+/// let gauge = LinearObservation::new(Matrix1::new(1.0), variance(1.0)?)?;
+/// let mut level = KalmanFilter::new(Vector1::new(2.0), variance(3.0)?)?;
+/// let innovation = level.correct(&gauge, &Default::default(), &Vector1::new(6.0))?;
+/// assert_eq!((innovation.error[0], innovation.variance[0], innovation.nis), (4.0, 4.0, 4.0));
+/// assert_eq!(innovation.action, Action::Updated);
+/// assert!(innovation.nis < 5.0239); // 95 % of those of a right model are below
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+#[cfg_attr(all(feature = "defmt", target_os = "none"), derive(defmt::Format))]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Innovation<T, E = T> {
     /// The measurement less its prediction, in the unit of the measurement. NaN where it is missing.
@@ -82,6 +118,21 @@ pub struct Innovation<T, E = T> {
     pub nis: T,
     /// What was done with the sample.
     pub action: Action,
+}
+
+impl<T, E> Innovation<T, E> {
+    /// What a predictor of another kind has found, for a [`ChangeDetector`](crate::ChangeDetector) for instance.
+    ///
+    /// ```
+    /// use thetahat_core::{Action, Innovation};
+    ///
+    /// let (error, variance) = (0.5_f32, 0.25);
+    /// let innovation = Innovation::new(error, variance, error * error / variance, Action::Updated);
+    /// assert_eq!(innovation.nis, 1.0);
+    /// ```
+    pub const fn new(error: E, variance: E, nis: T, action: Action) -> Self {
+        Innovation { error, variance, nis, action }
+    }
 }
 
 impl<T: Real> Innovation<T> {

@@ -1,6 +1,6 @@
 //! The Kalman filter, on a factored covariance.
 
-use nalgebra::{OMatrix, OVector};
+use nalgebra::{ArrayStorage, Const, OMatrix, OVector};
 
 use crate::dim::filled;
 use crate::error::{check_entries, check_length};
@@ -114,12 +114,9 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     /// [`with_release`](KalmanFilter::with_release) lets go.
     ///
     /// Errors: [`Error::OutOfRange`] if it is not above 0.
-    pub fn with_gate(self, gate: T) -> Result<Self, Error> {
-        if gate > T::zero() {
-            Ok(KalmanFilter { gate, ..self })
-        } else {
-            Err(Error::OutOfRange { argument: "gate", range: "above 0" })
-        }
+    pub fn with_gate(mut self, gate: T) -> Result<Self, Error> {
+        self.set_gate(gate)?;
+        Ok(self)
     }
 
     /// The same with a gate that lets go: after `count` measurements in a row that were above it, those that follow are used,
@@ -127,7 +124,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     ///
     /// An outlier is rarely followed by another: with independent outliers, one in twenty say, `count` of them in a row come
     /// once in 20^count samples. Each released measurement is weighed as any other: where P is small the state comes back
-    /// slowly, by the gain of the filter. ([`new`](KalmanFilter::new) with a large P is quicker, where the plant has jumped.)
+    /// slowly, by the gain of the filter. ([`widen`](KalmanFilter::widen) makes it quicker, where the plant has jumped.)
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
@@ -147,8 +144,81 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     /// assert!(filter.gated_in_a_row() == 0 && (filter.state()[0] - 100.0).abs() < 5.0);
     /// # Ok::<(), Error>(())
     /// ```
-    pub fn with_release(self, count: u16) -> Self {
-        KalmanFilter { release: count, ..self }
+    pub fn with_release(mut self, count: u16) -> Self {
+        self.set_release(count);
+        self
+    }
+
+    /// Puts the state where it is known to be. P stays: see [`set_covariance`](KalmanFilter::set_covariance). What the gate has
+    /// counted starts anew.
+    ///
+    /// Errors, after which nothing has changed: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`).
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Vector2};
+    /// use thetahat_core::{Covariance, Error, KalmanFilter};
+    ///
+    /// /// The cart stands at its reference switch. In a `static` or a task only a `&mut` of the filter is there.
+    /// fn at_the_switch(cart: &mut KalmanFilter<f32, Const<2>>) -> Result<(), Error> {
+    ///     cart.set_state(Vector2::new(1.5, 0.0))?;
+    ///     cart.set_covariance(Covariance::from_diagonal(&Vector2::new(1e-6, 0.0))?)
+    /// }
+    ///
+    /// let mut cart = KalmanFilter::new(Vector2::zeros(), Covariance::from_diagonal(&Vector2::new(9.0, 1.0))?)?;
+    /// at_the_switch(&mut cart)?;
+    /// assert_eq!(*cart.state(), Vector2::new(1.5, 0.0));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn set_state(&mut self, state: OVector<T, N>) -> Result<(), Error> {
+        check_entries("state", state.as_slice(), self.covariance.size().value())?;
+        (self.state, self.gated) = (state, 0);
+        Ok(())
+    }
+
+    /// Sets P. The state stays.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`).
+    pub fn set_covariance(&mut self, covariance: Covariance<T, N>) -> Result<(), Error> {
+        check_length("covariance", self.state.len(), covariance.size().value())?;
+        self.covariance = covariance;
+        Ok(())
+    }
+
+    /// Takes P for larger by a factor: the next measurements move the state more. For a state that is less sure than P says, as
+    /// after a fault. No variance shrinks, and one of 0 stays 0.
+    ///
+    /// ```text
+    /// P <- factor P,     factor >= 1
+    /// ```
+    ///
+    /// Errors, after which nothing has changed: [`Error::OutOfRange`] if the factor is not finite and at least 1;
+    /// [`Error::Overflow`]. n multiplications and n²/2 multiply-adds.
+    pub fn widen(&mut self, factor: T) -> Result<(), Error> {
+        self.covariance = self.covariance.widened(factor)?;
+        Ok(())
+    }
+
+    /// The same by a sum, P <- P + Q: what has come to the state beside the process noise, as where the plant was moved.
+    ///
+    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`); [`Error::Overflow`]. 1.5 n³ multiply-adds.
+    pub fn widen_by(&mut self, covariance: &Covariance<T, N>) -> Result<(), Error> {
+        self.covariance = self.covariance.plus(covariance)?;
+        Ok(())
+    }
+
+    /// Sets the gate: see [`with_gate`](KalmanFilter::with_gate), whose errors it has.
+    pub fn set_gate(&mut self, gate: T) -> Result<(), Error> {
+        if gate > T::zero() {
+            self.gate = gate;
+            Ok(())
+        } else {
+            Err(Error::OutOfRange { argument: "gate", range: "above 0" })
+        }
+    }
+
+    /// Sets when the gate lets go: see [`with_release`](KalmanFilter::with_release).
+    pub fn set_release(&mut self, count: u16) {
+        self.release = count;
     }
 
     /// The same to the bit, with its size in another type, see [`Covariance::to_size`]. With `Const` a step needs no heap,
@@ -203,7 +273,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     where
         N: Dimension<M>,
     {
-        self.covariance.transformed(&observation.output_matrix())?.plus(LinearObservation::noise(observation))
+        self.covariance.transformed(&observation.output_matrix())?.plus(observation.noise())
     }
 
     /// The time update: one sample ahead, with the input u(k).
@@ -223,7 +293,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         check_entries("input", input.as_slice(), transition.input_matrix().ncols())?;
         check_length("transition", self.state.len(), transition.state_matrix().ncols())?;
         let next = transition.next(&self.state, input);
-        let (noise_matrix, noise) = (transition.noise_matrix(), LinearTransition::noise(transition));
+        let (noise_matrix, noise) = (transition.noise_matrix(), transition.noise());
         self.propagate(next, transition.state_matrix(), noise_matrix, noise)
     }
 
@@ -286,7 +356,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         check_entries("cross_covariance", cross_covariance.as_slice(), n * m)?;
         let error = prediction_error(measurement, observation.output(&self.state, input))?;
         let (mut rows, mut cross) = (observation.output_rows().clone(), cross_covariance.clone());
-        let noise = LinearObservation::noise(observation);
+        let noise = observation.noise();
         let mut whitened = error.clone();
         whiten(cross.as_mut_slice(), whitened.as_mut_slice(), noise);
         ud::copy(error.as_slice(), whitened.as_mut_slice());
@@ -296,7 +366,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         let mut next = transition.next(&self.state, input);
         let mut state_matrix = transition.state_matrix().clone();
         let mut rest = transition.noise_matrix().clone();
-        let given = LinearTransition::noise(transition).variances();
+        let given = transition.noise().variances();
         for (index, (error, &whitened)) in error.iter().zip(whitened.iter()).enumerate() {
             if is_missing(error) {
                 continue;
@@ -349,7 +419,7 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         check_entries("input", input.as_slice(), observation.input_matrix().ncols())?;
         check_length("observation", self.state.len(), observation.output_rows().nrows())?;
         let error = prediction_error(measurement, observation.output(&self.state, input))?;
-        let noise = LinearObservation::noise(observation);
+        let noise = observation.noise();
         self.absorb(observation.output_rows().clone(), error, noise, |_, _, _, _| ())
     }
 
@@ -518,6 +588,54 @@ fn whiten<T: Real, M: Dimension>(
     }
     partial
 }
+
+/// Filters that are constants, in single and in double precision.
+macro_rules! constant {
+    ($real:ty) => {
+        impl<const N: usize> KalmanFilter<$real, Const<N>> {
+            /// The same as [`new`](KalmanFilter::new) as a constant, for a filter in a `static`: nothing is set up at run time.
+            ///
+            /// Errors: [`Error::NotFinite`].
+            ///
+            /// ```
+            /// use std::sync::Mutex;
+            /// use thetahat_core::nalgebra::{Const, Vector2};
+            /// use thetahat_core::{Covariance, Error, KalmanFilter};
+            ///
+            /// type Cart = KalmanFilter<f32, Const<2>>;
+            /// const AT_REST: Result<Cart, Error> = match Covariance::<f32, _>::constant([9.0, 1.0]) {
+            ///     Ok(prior) => Cart::constant([0.0, 0.0], prior),
+            ///     Err(error) => Err(error),
+            /// };
+            /// static CART: Mutex<Cart> = Mutex::new(match AT_REST {
+            ///     Ok(cart) => cart,
+            ///     Err(_) => panic!("a number is wrong"), // it does not compile then
+            /// });
+            ///
+            /// CART.lock().unwrap().set_state(Vector2::new(1.5, 0.0))?;
+            /// # Ok::<(), Error>(())
+            /// ```
+            pub const fn constant(
+                state: [$real; N],
+                covariance: Covariance<$real, Const<N>>,
+            ) -> Result<Self, Error> {
+                let mut index = 0;
+                while index < N {
+                    if !state[index].is_finite() {
+                        return Err(Error::NotFinite { argument: "state" });
+                    }
+                    index += 1;
+                }
+                let state = OVector::<$real, Const<N>>::from_array_storage(ArrayStorage([state]));
+                let gate = <$real>::INFINITY;
+                Ok(KalmanFilter { state, covariance, gate, release: 0, gated: 0, scratch: () })
+            }
+        }
+    };
+}
+
+constant!(f32);
+constant!(f64);
 
 #[cfg(feature = "serde")]
 mod snapshot;

@@ -7,7 +7,7 @@ use nalgebra::{Const, OVector};
 use crate::error::check_length;
 use crate::{Dimension, Error, Real, ud};
 
-pub use orders::{ArxOrders, InputOrders};
+pub use orders::{ArxOrders, ConstantOrders, InputOrders};
 
 /// The delay line of one input that has coefficients, or of what else is in φ after the outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -360,6 +360,18 @@ impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
         let mut taps = self.regressor.as_mut_slice();
         for &output in outputs {
             shift(take(&mut taps, na), -output);
+        }
+    }
+
+    /// Takes `change`, one for each output, from the latest outputs, whose negatives the lines hold.
+    #[inline(always)]
+    pub(crate) fn take_from_newest(&mut self, change: impl Fn(usize) -> T) {
+        let (na, outputs) = (self.na.into(), self.outputs());
+        let mut taps = self.regressor.as_mut_slice();
+        for index in 0..outputs {
+            if let [newest, ..] = take(&mut taps, na) {
+                *newest += change(index);
+            }
         }
     }
 

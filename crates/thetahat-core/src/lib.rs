@@ -67,13 +67,17 @@
 //!   evaluated, and never for a row or a sample; filters allocate in a step too, for what has the size of the
 //!   measurement.
 //! - It has no types but real scalars, no sparse matrices, and no multithreading.
-//! - It logs nothing.
+//! - It logs nothing. (What it answers can be logged: see the features.)
 //!
 //! # Features
 //!
 //! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch
 //!   program that reads the orders from its user. Off by default, so that firmware needs no allocator.
-//! - `serde`: snapshots that can be written and read back. Off by default, as a clone is a snapshot too.
+//! - `serde`: snapshots that can be written and read back, and [`Error`], [`Action`] and [`Innovation`] for telemetry (an error is written
+//!   only: its words are constants of the program). Off by default, as a clone is a snapshot too.
+//! - `defmt`: `defmt::Format` of [`Error`], [`Action`], [`Innovation`] and [`Alarm`], whose words stay on the host. On microcontrollers
+//!   only (`target_os = "none"`), where the program brings the logger; nalgebra's own feature `defmt` has that of vectors, so of states.
+//!   Off by default, as a program that logs in another way needs none of it.
 //! - `autodiff`: models that are written as one function, with exact Jacobians from dual numbers. Off by default,
 //!   as linear models and Jacobians by hand need none.
 //!
@@ -133,6 +137,7 @@ mod luenberger;
 mod noise;
 mod nonlinear_arx;
 mod out_of_sequence;
+mod outliers;
 mod output_error;
 mod recursive_narx;
 mod rls;
@@ -162,9 +167,9 @@ pub use basis::{
     Radial, Spline,
 };
 pub use control::{
-    DirectOrders, DirectSelfTuner, IndirectSelfTuner, LinearQuadratic, MinimumVariance,
+    DirectOrders, DirectSelfTuner, Distrust, Fallback, IndirectSelfTuner, LinearQuadratic, MinimumVariance,
     MinimumVarianceOrders, PidSettings, PlacementOrders, Probing, ResponseWanted, RstController, Sensor,
-    TunerModel, TunerOrders, TunerSettings, TunerState, WantedPoles,
+    Supervision, TunerModel, TunerOrders, TunerSettings, TunerState, WantedPoles,
 };
 pub use covariance::Covariance;
 pub use detect::{Alarm, ChangeDetector, Chart};
@@ -178,11 +183,12 @@ pub use error::Error;
 pub use forgetting::{Forgetting, ForgettingPolicy, PolicyNumber, PolicyRange, RlsStart};
 pub use innovation::{Action, Innovation};
 pub use kalman::KalmanFilter;
-pub use lags::{ArxOrders, InputOrders, Lags};
+pub use lags::{ArxOrders, ConstantOrders, InputOrders, Lags};
 pub use least_squares::{LeastSquares, Rank};
 pub use luenberger::LuenbergerObserver;
 pub use nonlinear_arx::{NonlinearArx, Scaling};
 pub use out_of_sequence::{FilterHistory, OutOfSequenceFilter};
+pub use outliers::Outliers;
 pub use output_error::{OutputErrorMethod, RecursiveOutputError};
 pub use recursive_narx::RecursiveNarx;
 pub use rls::RecursiveLeastSquares;

@@ -89,6 +89,35 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
         &self.gain
     }
 
+    /// Puts the estimate where the state is known to be.
+    ///
+    /// Errors, after which nothing has changed: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`).
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Vector1};
+    /// use thetahat_core::{Error, LuenbergerObserver};
+    ///
+    /// let mut tank = LuenbergerObserver::<f32, Const<1>, Const<1>>::new(Vector1::new(0.0), Vector1::new(0.5))?;
+    /// tank.set_state(Vector1::new(20.0))?;
+    /// assert_eq!(tank.state()[0], 20.0);
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn set_state(&mut self, state: OVector<T, N>) -> Result<(), Error> {
+        check_entries("state", state.as_slice(), self.state.len())?;
+        self.state = state;
+        Ok(())
+    }
+
+    /// Sets the gain L, n x m.
+    ///
+    /// Errors, after which nothing has changed: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`).
+    pub fn set_gain(&mut self, gain: OMatrix<T, N, M>) -> Result<(), Error> {
+        check_length("gain", self.gain.nrows(), gain.nrows())?;
+        check_entries("gain", gain.as_slice(), self.gain.len())?;
+        self.gain = gain;
+        Ok(())
+    }
+
     /// Sets the gain so that F - L H has these poles, where F and H are the Jacobians at the estimate.
     ///
     /// Several outputs are combined into one, c'y, by the weights c: L = l c', where l places the poles of
@@ -123,10 +152,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> Luenberg
         check_entries("weights", weights.as_slice(), m)?;
         check_length("poles", n, poles.len())?;
         Self::check_poles(poles)?;
-        let state_matrix = transition.jacobian(&self.state, input);
+        let state_matrix = transition.next_jacobian(&self.state, input);
         check_length("transition Jacobian", n, state_matrix.nrows())?;
         check_entries("transition Jacobian", state_matrix.as_slice(), n * n)?;
-        let output_matrix = observation.jacobian(&self.state, input);
+        let output_matrix = observation.output_jacobian(&self.state, input);
         check_length("observation Jacobian", m, output_matrix.nrows())?;
         check_entries("observation Jacobian", output_matrix.as_slice(), m * n)?;
 

@@ -8,6 +8,22 @@ use crate::lags::is_infinite;
 use crate::{ArxOrders, Basis, Dimension, Error, Lags, Real};
 
 /// How a signal is made about 1 in size: z = (x - offset)/scale.
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{ArxOrders, Error, NonlinearArx, Polynomial, Scaling};
+///
+/// // y(k) = 20 + 4 z_0, z_0 = (y(k-1) - 20)/8: the deviation from 20 is halved in each sample.
+/// const ORDERS: ArxOrders = ArxOrders { na: 1, inputs: &[], constant: false };
+/// const BASIS: Polynomial = Polynomial { factors: &[0], ends: &[1] };
+/// let scaling = Scaling { offset: 20.0, scale: 8.0 };
+/// let mut cooling: NonlinearArx<f64, Polynomial, Const<1>> = NonlinearArx::new(BASIS, &ORDERS, scaling, &[])?;
+/// cooling.log_row(28.0, &[])?;
+/// let mut ahead = [0.0; 2];
+/// cooling.predict(&[0.5], &[], &mut ahead)?;
+/// assert_eq!(ahead, [24.0, 22.0]);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scaling<T> {
     /// What is subtracted, in the unit of the signal: its mean, or the working point.

@@ -250,6 +250,36 @@ impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSeque
         self.filter.correct(observation, &input, &measurement)
     }
 
+    /// Changes the filter of now, by [`set_state`](ExtendedKalmanFilter::set_state), [`widen`](ExtendedKalmanFilter::widen) and the
+    /// like. What is kept of the past ends here: measurements of samples before are too late, as they would undo the change.
+    ///
+    /// Errors, after which nothing has changed: what `change` answers; [`Error::Length`] (only with `Dyn`) if it leaves a filter of
+    /// another size.
+    ///
+    /// ```
+    /// use thetahat_core::nalgebra::{Const, Vector1};
+    /// use thetahat_core::{Covariance, Error, ExtendedKalmanFilter, OutOfSequenceFilter};
+    ///
+    /// let prior: Covariance<f64, Const<1>> = Covariance::from_diagonal(&Vector1::new(4.0))?;
+    /// let filter = ExtendedKalmanFilter::new(Vector1::new(0.0), prior)?;
+    /// let mut tank: OutOfSequenceFilter<f64, _, Const<1>, Const<0>, Const<16>> =
+    ///     OutOfSequenceFilter::new(filter, Const, Const, 2)?;
+    /// tank.change(|filter| filter.set_state(Vector1::new(20.0)))?; // it was filled
+    /// assert_eq!((tank.filter().state()[0], tank.kept()), (20.0, 0));
+    /// # Ok::<(), Error>(())
+    /// ```
+    pub fn change(
+        &mut self,
+        change: impl FnOnce(&mut ExtendedKalmanFilter<T, N>) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut filter = self.filter.clone();
+        change(&mut filter)?;
+        check_length("state", self.history.states, filter.state().len())?;
+        (self.filter, self.kept) = (filter, 0);
+        self.begin();
+        Ok(())
+    }
+
     /// The filter as it is now.
     pub fn filter(&self) -> &ExtendedKalmanFilter<T, N> {
         &self.filter

@@ -6,11 +6,11 @@ use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
-use crate::rls::check_limits;
+use crate::rls::{check_limits, pass_on_settings};
 use crate::stability::{is_stable, move_stably};
 use crate::ud::{copy, dot};
 use crate::{
-    Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, Lags, Real,
+    Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Outliers, Real,
     RecursiveLeastSquares,
 };
 
@@ -30,6 +30,17 @@ use crate::{
 /// With white noise 375 of 400 parameters lay within 1.96 standard errors of `PredictionError`.
 ///
 /// (Printed by `cargo test -p thetahat-core --lib output_error::tests::table -- --nocapture`.)
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{ArxOrders, Error, Forgetting, InputOrders, OutputErrorMethod, RecursiveOutputError};
+///
+/// const ORDERS: ArxOrders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+/// type Plant = RecursiveOutputError<f32, Const<{ ORDERS.parameters() }>>;
+/// let plant = Plant::new(&ORDERS, OutputErrorMethod::Instruments, 5.0, &[1.0], Forgetting::None)?;
+/// assert_eq!(plant.f().count(), 2); // 1 and f_1
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OutputErrorMethod {
@@ -45,7 +56,8 @@ pub enum OutputErrorMethod {
     ///
     /// of what was measured. It is linear in the parameters, so that there is no minimum but the one, whatever the colour
     /// of the noise of the sensor; and it needs nf measurements in a row before it learns again. The equation error is not
-    /// white even where the noise of the sensor is. So the variance of the noise, standard errors and `nis` are not known.
+    /// white even where the noise of the sensor is. So the variance of the noise, standard errors and `nis` are not known, and there is no
+    /// rule for [outliers](crate::Outliers).
     ///
     /// P is the symmetric one of the instruments, and its factors stay positive in single precision. (The other one,
     /// (Σ ψ φ')⁻¹, has no factors and may become singular. With both sides filtered by 1/F(q), the refined instrumental
@@ -148,33 +160,35 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         Ok(this)
     }
 
-    /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
-    /// it has.
-    ///
-    /// Errors: also [`Error::OutOfRange`] if F is not stable.
-    pub fn with_parameters(mut self, parameters: OVector<T, N>) -> Result<Self, Error> {
-        self.estimator = self.estimator.with_parameters(parameters)?;
-        self.check_stable()?;
-        Ok(self)
+    /// The same as [`new`](RecursiveOutputError::new) for orders that are constants, so that wrong sizes do not compile: see
+    /// [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
+    pub fn of<O: ConstantOrders>(
+        method: OutputErrorMethod,
+        output_scale: T,
+        input_scales: &[T],
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        const {
+            assert!(
+                Self::fits(&O::ORDERS),
+                "N is not the number of parameters, or D is less than that of delays"
+            )
+        };
+        Self::new(&O::ORDERS, method, output_scale, input_scales, forgetting)
     }
 
-    /// That F is stable.
-    fn check_stable(&self) -> Result<(), Error> {
-        let mut f = self.estimator.parameters().clone();
+    /// That F, the first of these parameters, is stable.
+    fn check_stable(&self, mut f: OVector<T, N>) -> Result<(), Error> {
         let f = f.as_mut_slice().get_mut(..self.nf).unwrap_or_default();
         let range = "such that F(q) is stable";
         is_stable(f).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
     }
 
-    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
-    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveOutputError { estimator: self.estimator.with_covariance(covariance)?, ..self })
-    }
-
     /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has. The error that is compared with
     /// it is that of the method.
-    pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
-        Ok(RecursiveOutputError { estimator: self.estimator.with_dead_zone(width)?, ..self })
+    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
+        self.set_dead_zone(width)?;
+        Ok(self)
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -341,12 +355,12 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
             copy(estimator.parameters().as_slice(), before);
             let out = estimator.project(limits);
             if out && !has_stable(estimator.parameters().as_slice(), *nf, work) {
-                estimator.set_parameters(before);
+                estimator.put_parameters(before);
                 estimator.cut_off(limits);
                 if !has_stable(estimator.parameters().as_slice(), *nf, work) {
                     let rest = estimator.parameters().as_slice().get(*nf..).unwrap_or_default();
                     copy(rest, before.get_mut(*nf..).unwrap_or_default());
-                    estimator.set_parameters(before);
+                    estimator.put_parameters(before);
                 }
             }
             out
@@ -385,17 +399,28 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         self.forget_past();
     }
 
-    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
-    /// so that predictions go on.
-    pub fn set_adaptation(&mut self, on: bool) {
-        self.estimator.set_adaptation(on);
+    /// Sets the parameters: see [`RecursiveLeastSquares::set_parameters`], whose errors it has.
+    ///
+    /// Errors: also [`Error::OutOfRange`] if F is not stable.
+    pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
+        self.estimator.check_parameters(&parameters)?;
+        self.check_stable(parameters.clone())?;
+        self.estimator.set_parameters(parameters)
     }
 
-    /// The least squares estimator: parameters, covariance, excitation; with
-    /// [`PredictionError`](OutputErrorMethod::PredictionError) the noise variance and standard errors too.
-    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N> {
-        &self.estimator
+    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
+    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
+        self.estimator.set_dead_zone(width)
     }
+
+    /// That the variance of the noise is known, which a rule for outliers compares with.
+    fn knows_noise(&self, outliers: Outliers<T>) -> Result<(), Error> {
+        let range = "for PredictionError only: with Instruments the variance of the noise is not known";
+        let known = self.method == OutputErrorMethod::PredictionError || outliers == Outliers::Used;
+        known.then_some(()).ok_or(Error::OutOfRange { argument: "outliers", range })
+    }
+
+    pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>, Self::knows_noise);
 }
 
 /// Whether the first `nf` parameters make a stable polynomial.

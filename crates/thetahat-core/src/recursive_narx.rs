@@ -4,8 +4,9 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OVector};
 
+use crate::rls::pass_on_settings;
 use crate::{
-    Action, ArxOrders, Basis, Covariance, Dimension, Error, Forgetting, Innovation, Lags, NonlinearArx, Real,
+    Action, ArxOrders, Basis, Dimension, Error, Forgetting, Innovation, Lags, NonlinearArx, Real,
     RecursiveLeastSquares, RlsStart, Scaling, Solution,
 };
 
@@ -112,17 +113,6 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         Ok(RecursiveNarx { estimator: self.estimator.with_start(start)?, ..self })
     }
 
-    /// The same with these parameters to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
-    /// it has.
-    pub fn with_parameters(self, parameters: OVector<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveNarx { estimator: self.estimator.with_parameters(parameters)?, ..self })
-    }
-
-    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
-    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveNarx { estimator: self.estimator.with_covariance(covariance)?, ..self })
-    }
-
     /// The same started from a batch solution on the functions. See [`RecursiveLeastSquares::with_solution`], whose errors it
     /// has.
     pub fn with_solution(self, solution: &Solution<T, N>) -> Result<Self, Error> {
@@ -131,16 +121,15 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
 
     /// The same with a noise variance, in squared units of the output, that is known from earlier samples. See
     /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
-    pub fn with_noise_variance(self, variance: T, samples: usize) -> Result<Self, Error> {
-        let scale = self.model.output.scale;
-        let estimator = self.estimator.with_noise_variance(variance / (scale * scale), samples)?;
-        Ok(RecursiveNarx { estimator, ..self })
+    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
+        self.set_noise_variance(variance, samples)?;
+        Ok(self)
     }
 
     /// The same with a dead zone, in the unit of the output. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
-    pub fn with_dead_zone(self, width: T) -> Result<Self, Error> {
-        let estimator = self.estimator.with_dead_zone(width / self.model.output.scale)?;
-        Ok(RecursiveNarx { estimator, ..self })
+    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
+        self.set_dead_zone(width)?;
+        Ok(self)
     }
 
     /// y(k) arrives: time goes on to k, and the model learns. See [`RecursiveArx::measured`](crate::RecursiveArx::measured),
@@ -182,6 +171,10 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
             estimator.take(functions, output).ok()
         });
         if let Some(innovation) = taken.flatten() {
+            if let Some(unused) = estimator.unused(innovation.nis, innovation.action) {
+                // These lines hold outputs, not their negatives.
+                model.lags.take_from_newest(|_| -innovation.error * unused);
+            }
             let (error, variance) = (innovation.error * scale, innovation.variance * scale * scale);
             return Innovation { error, variance, ..innovation };
         }
@@ -221,21 +214,28 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         self.model.gap();
     }
 
-    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
-    /// so that predictions go on.
-    pub fn set_adaptation(&mut self, on: bool) {
-        self.estimator.set_adaptation(on);
+    /// Sets the parameters: see [`RecursiveLeastSquares::set_parameters`], whose errors it has.
+    pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
+        self.estimator.set_parameters(parameters)
     }
 
-    /// The least squares estimator, on functions of scaled signals: parameters, covariance, excitation.
-    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N> {
-        &self.estimator
+    /// Sets the noise variance, in squared units of the output: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
+    pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
+        let scale = self.model.output.scale;
+        self.estimator.set_noise_variance(variance / (scale * scale), samples)
+    }
+
+    /// Sets the dead zone, in the unit of the output: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
+    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
+        self.estimator.set_dead_zone(width / self.model.output.scale)
     }
 
     /// The model without its parameters: functions, scalings, delay lines, and the slopes of g.
     pub fn model(&self) -> &NonlinearArx<T, B, Z, D> {
         &self.model
     }
+
+    pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
 }
 
 #[cfg(feature = "serde")]

@@ -5,15 +5,17 @@ use nalgebra::{Const, OMatrix, OVector};
 use crate::dim::filled;
 use crate::error::{check_entries, check_finite, check_length};
 use crate::forgetting::{Forgetting, Phase, RlsStart};
+use crate::outliers::Watch;
 use crate::triangle::{column, column_mut};
 use crate::ud::dot;
-use crate::{Covariance, Dimension, Error, Innovation, Real, Solution, ud};
+use crate::{Covariance, Dimension, Error, Innovation, Outliers, Real, Solution, ud};
 
 mod after;
 mod estimates;
 mod limits;
 mod residuals;
 mod sample;
+mod settings;
 #[cfg(feature = "serde")]
 mod snapshot;
 
@@ -21,6 +23,7 @@ use after::After;
 pub(crate) use limits::check_limits;
 use residuals::Residuals;
 pub(crate) use sample::is_small;
+pub(crate) use settings::pass_on_settings;
 
 /// Recursive least squares: a regressor and an output in each sample, the parameters out at any time.
 ///
@@ -37,7 +40,7 @@ pub(crate) use sample::is_small;
 ///
 /// P = U D U' is kept as its factors and updated by formulas that do not subtract variances: it never becomes
 /// indefinite, in `f32` too. And it is bounded, so that neither silence nor a held input makes the estimate
-/// useless. (Measured with λ = 0.99 and a silent input: without the bound P was lost after 59,000 steps in `f32`
+/// useless: nothing is forgotten [where it is at its bound](Forgetting#the-bound). (Measured with λ = 0.99 and a silent input: without the bound P was lost after 59,000 steps in `f32`
 /// and after 121,000 in `f64`, factored as it was.)
 ///
 /// # Scales
@@ -60,8 +63,14 @@ pub(crate) use sample::is_small;
 /// unknown (`None`) until W²/W₂, the number of samples that count, exceeds n. A sample that tells more of the
 /// parameters than of the noise, φ'P⁻φ > 10, enters as 0, as it would without prior. (Where the noise is below a
 /// hundredth of the output, σ̂² starts too large all the same: the prior pulls at the first samples. The exact start
-/// has no such error: where no prior is in, every sample counts, and without forgetting σ̂² is that of the batch.) With selective forgetting λ is the `factor`; the random walk does not forget residuals, and
-/// its P is the covariance, cov θ̂ = σ̂² P.
+/// has no such error: where no prior is in, every sample counts, and without forgetting σ̂² is that of the batch.) With
+/// selective forgetting λ is the `factor`; the random walk does not forget residuals, and its P is the covariance,
+/// cov θ̂ = σ̂² P.
+///
+/// In the directions in which nothing is forgotten, as they are [at their bound](Forgetting#the-bound) or silent, the noise
+/// variance of cov θ̂ is the largest since that began, and at the bound W₂/W is 1 there: a loop that has settled, with
+/// samples that agree to the last digit, says nothing of what it does not excite. What the prior does not allow for shows
+/// nowhere: of a plant without noise that never was excited, errors can be some ten standard errors.
 ///
 /// # Several outputs
 ///
@@ -72,9 +81,8 @@ pub(crate) use sample::is_small;
 ///
 /// θ_j has the unit of y over that of φ_j. P_ij has one over the units of φ_i and φ_j.
 ///
-/// Memory: n² + n (m + 1) + m + 7 numbers and a few counters: 140 bytes for n = 4 in `f32` on a 32-bit machine. An
-/// update costs 1.5 n² + (6 + m) n multiply-adds and n divisions, and half as much again where a variance is
-/// brought back to its bound. No square root.
+/// Memory: n² + n (2 m + 1) + m + 7 numbers, n flags and a few counters: 164 bytes for n = 4 in `f32` on a 32-bit machine.
+/// An update costs 1.5 n² + (6 + m) n multiply-adds and n divisions. No square root.
 ///
 /// Source: Ljung, System Identification, 2nd ed., section 11.2; Bierman, Factorization Methods for Discrete
 /// Sequential Estimation, 1977, chapter V (the factors).
@@ -107,11 +115,17 @@ pub(crate) use sample::is_small;
 pub struct RecursiveLeastSquares<T: Real, N: Dimension + Dimension<M>, M: Dimension = Const<1>> {
     parameters: OMatrix<T, N, M>,
     covariance: Covariance<T, N>,
-    /// p_j: the prior variances, and the largest that the cap leaves.
+    /// p_j: the prior variances, and the largest that forgetting makes.
     bounds: OVector<T, N>,
     residuals: Residuals<T, M>,
     forgetting: Forgetting<T>,
     dead_zone: T,
+    outliers: Watch<T>,
+    /// Which columns of U are held, and how many.
+    held: OVector<bool, N>,
+    held_columns: u16,
+    /// The largest v since a column was forgotten, for each output; 0 while it is.
+    noises: OMatrix<T, N, M>,
     /// Whose variance is compared with its bound next.
     turn: u16,
     phase: Phase,
@@ -134,7 +148,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// forgetting policy is out of its range; [`Error::Length`] for more than 65,535 parameters.
     ///
     /// A policy that is a constant here, and a start that is one in [`with_start`](RecursiveLeastSquares::with_start),
-    /// keep out of the program what others would need: of 2.9 kB on a Cortex-M4F, 1 kB more with the random walk or
+    /// keep out of the program what others would need: of 4.3 kB on a Cortex-M4F, 1 kB more with the random walk or
     /// another start.
     #[inline]
     pub fn new(scales: &OVector<T, N>, forgetting: Forgetting<T>) -> Result<Self, Error> {
@@ -205,7 +219,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// known before this sample. Until σ̂² is known the variance is NaN, and `nis` is 0; it is at most
     /// [`Real::LARGEST_ENTRY`].
     ///
-    /// [`Action`](crate::Action) tells what was done: `Updated`; `Capped`, updated and a variance brought back to its bound;
+    /// [`Action`](crate::Action) tells what was done: `Updated`; `Capped`, updated and a variance at its bound;
     /// `Collecting`, see [`RlsStart::Exact`]; `Missing`; `Skipped`, in the dead zone; `Frozen`.
     ///
     /// Errors, after which nothing has changed: [`Error::Infinite`]; [`Error::TooLarge`] for numbers whose products
@@ -248,17 +262,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// # Ok::<(), Error>(())
     /// ```
     pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
-        if !(variance >= T::zero() && variance.is_finite()) {
-            return Err(Error::OutOfRange { argument: "variance", range: "finite and at least 0" });
-        }
-        let n = self.bounds.len();
-        if samples <= n {
-            return Err(Error::TooFewRows { needed: n.saturating_add(1), found: samples });
-        }
-        let share = T::from_count(samples - n) / T::from_count(samples);
-        self.residuals.mean_squares.fill(variance * share);
-        let samples = T::from_count(samples);
-        (self.residuals.weights, self.residuals.squared_weights) = (samples, samples);
+        self.set_noise_variance(variance, samples)?;
         Ok(self)
     }
 
@@ -322,6 +326,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             residuals: Residuals::new(outputs),
             forgetting,
             dead_zone: T::zero(),
+            outliers: Watch::new(Outliers::Used)?,
+            held: size.vector(false),
+            held_columns: 0,
+            noises: size.rows_by(outputs, T::zero()),
             turn: 0,
             phase: Phase::Running,
             shares: 0,
@@ -373,7 +381,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         self.parameters.fill(T::zero());
         self.residuals.clear();
         self.turn = 0;
+        self.hold_none();
         Ok(self)
+    }
+
+    /// No column of U is held.
+    fn hold_none(&mut self) {
+        self.held.fill(false);
+        self.noises.fill(T::zero());
+        self.held_columns = 0;
     }
 
     /// The same with these parameters, n x m, to start from: a warm start. The start is then [`RlsStart::Standard`],
@@ -383,31 +399,19 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::NotFinite`]; [`Error::TooLarge`] if a regressor of its
     /// scale would predict more than any output that can be absorbed (7e15 in `f32`).
     pub fn with_parameters(mut self, parameters: OMatrix<T, N, M>) -> Result<Self, Error> {
-        check_length("parameters", self.parameters.nrows(), parameters.nrows())?;
-        check_length("parameters", self.parameters.ncols(), parameters.ncols())?;
-        check_parameters(parameters.as_slice(), self.bounds.as_slice())?;
-        self.parameters = parameters;
-        if self.phase == Phase::Collecting {
-            self.covariance = Covariance::independent(&self.bounds);
-        }
-        (self.phase, self.shares, self.shares_left) = (Phase::Given, 0, 0);
+        self.set_parameters(parameters)?;
         Ok(self)
     }
 
     /// The same with this P, n x n, to start from, in units of the noise variance: how sure the parameters of
     /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`RlsStart::Standard`], as there.
     ///
-    /// A variance of 0 holds a parameter at its value, with every policy. One above the bound is brought back to it, if the policy
-    /// forgets.
+    /// A variance of 0 holds a parameter at its value, with every policy. One above the bound does not grow.
     ///
     /// Errors: [`Error::Length`] (only with `Dyn`); [`Error::TooLarge`] if a variance exceeds what the largest
     /// prior can be (3e20 in `f32`).
     pub fn with_covariance(mut self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        check_length("covariance", self.bounds.len(), covariance.size().value())?;
-        let fits = covariance.variances().iter().all(|&variance| is_prior(variance));
-        fits.then_some(()).ok_or(Error::TooLarge { argument: "covariance" })?;
-        self.covariance = covariance;
-        (self.phase, self.shares, self.shares_left) = (Phase::Given, 0, 0);
+        self.set_covariance(covariance)?;
         Ok(self)
     }
 
@@ -421,11 +425,27 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     ///
     /// Source: Åström and Wittenmark, Adaptive Control, 2nd ed., section 11.4.
     pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
-        if !(width >= T::zero() && width.is_finite()) {
-            return Err(Error::OutOfRange { argument: "width", range: "finite and at least 0" });
-        }
-        self.dead_zone = width;
+        self.set_dead_zone(width)?;
         Ok(self)
+    }
+
+    /// The same with a rule for outliers: see [`Outliers`].
+    ///
+    /// Errors: [`Error::OutOfRange`] if the threshold is not 1 or more.
+    pub fn with_outliers(mut self, outliers: Outliers<T>) -> Result<Self, Error> {
+        self.set_outliers(outliers)?;
+        Ok(self)
+    }
+
+    /// The rule for outliers.
+    pub fn outliers(&self) -> Outliers<T> {
+        self.outliers.rule()
+    }
+
+    /// How many of the latest samples were outliers, since the last one that was none, at most 65,535; missing ones do not
+    /// count. More than a few: what is taken for outliers is a change of the plant or of the noise.
+    pub fn outliers_in_a_row(&self) -> u16 {
+        self.outliers.in_a_row
     }
 
     /// Turns adaptation off, or on again. While it is off innovations are computed and nothing changes:
@@ -482,11 +502,11 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// One sample without a measurement, which is what a NaN is. Only the random walk takes note of it, once the
-    /// start is over and while adaptation is on; a variance that comes back to its bound here is not reported.
+    /// start is over and while adaptation is on; a variance that comes to its bound here is not reported.
     pub fn advance(&mut self) {
         if self.forgetting.walk().is_some() && self.phase.is_running() && self.adapting {
             self.after.call(self);
-            self.cap();
+            self.hold();
         }
     }
 
@@ -506,6 +526,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             residuals: self.residuals.clone(),
             forgetting: self.forgetting,
             dead_zone: self.dead_zone,
+            outliers: self.outliers,
+            held: filled(size.vector(false), self.held.as_slice()),
+            held_columns: self.held_columns,
+            noises: filled(size.rows_by(outputs, T::zero()), self.noises.as_slice()),
             turn: self.turn,
             phase: self.phase,
             shares: self.shares,
@@ -534,24 +558,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     fn of_output(&self, index: usize) -> &[T] {
         column(self.parameters.as_slice(), self.bounds.len(), index)
     }
-}
-
-/// Whether a variance is none that exceeds that of the smallest scale.
-fn is_prior<T: Real>(variance: T) -> bool {
-    let reciprocal_scale = (variance / T::from_count(100)).sqrt();
-    // Twice the limit, for the rounding.
-    reciprocal_scale * reciprocal_scale * reciprocal_scale <= T::LARGEST_ENTRY * T::from_count(2)
-}
-
-/// That parameters are finite, and what they predict of regressors of their scales can be absorbed.
-fn check_parameters<T: Real>(parameters: &[T], bounds: &[T]) -> Result<(), Error> {
-    check_finite("parameters", parameters)?;
-    let fits = |(&parameter, &bound): (&T, &T)| {
-        // The square of a hundredth of what is predicted: what was absorbed may have made more of it than can be absorbed again.
-        parameter / bound * parameter / T::from_count(100) <= T::LARGEST_ENTRY
-    };
-    let fit = parameters.iter().zip(bounds.iter().cycle()).all(fits);
-    fit.then_some(()).ok_or(Error::TooLarge { argument: "parameters" })
 }
 
 #[cfg(test)]

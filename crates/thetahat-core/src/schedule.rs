@@ -48,6 +48,22 @@ pub struct GainSchedule<T: Real, N: Dimension> {
 }
 
 /// What a Kalman filter comes to when its model does not change in time.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+/// use thetahat_core::{Covariance, Error, GainSchedule, LinearObservation, LinearTransition};
+///
+/// // A level that walks with variance 1/2 a sample, measured with variance 1.
+/// let variance = |value: f64| Covariance::<f64, Const<1>>::from_diagonal(&Vector1::new(value));
+/// let walk = LinearTransition::new(Matrix1::new(1.0), variance(0.5)?)?;
+/// let gauge = LinearObservation::new(Matrix1::new(1.0), variance(1.0)?)?;
+/// let steady = GainSchedule::new(variance(1.0)?).steady_state(&walk, &gauge, 100)?;
+/// // P before a measurement solves P² - P/2 - 1/2 = 0.
+/// assert!((steady.predicted.variances()[0] - 1.0).abs() < 1e-12);
+/// assert!((steady.filtered.variances()[0] - 0.5).abs() < 1e-12);
+/// assert!((steady.gain[0] - 0.5).abs() < 1e-12);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct SteadyState<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
@@ -85,12 +101,7 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     {
         let state = self.filter.state().clone();
         check_length("transition", state.len(), transition.state_matrix().ncols())?;
-        self.filter.propagate(
-            state,
-            transition.state_matrix(),
-            transition.noise_matrix(),
-            LinearTransition::noise(transition),
-        )
+        self.filter.propagate(state, transition.state_matrix(), transition.noise_matrix(), transition.noise())
     }
 
     /// The measurement update: K, n x m.
@@ -103,7 +114,7 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     where
         N: Dimension<M>,
     {
-        let noise = LinearObservation::noise(observation);
+        let noise = observation.noise();
         let (n, m) = (self.filter.state().len(), noise.size());
         let mut gain = self.covariance().size().rows_by(m, T::zero());
         let mut corrected = self.clone();
@@ -181,7 +192,7 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     where
         N: Dimension<U> + Dimension<M>,
     {
-        let (size, outputs) = (self.covariance().size(), LinearObservation::noise(observation).size());
+        let (size, outputs) = (self.covariance().size(), observation.noise().size());
         self.predict(transition)?;
         let mut matrix = self.covariance().matrix();
         let (mut least_change, mut least_at) = (T::INFINITY, 0);
@@ -229,7 +240,7 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     {
         let rows = observation.output_rows();
         check_length("observation", self.filter.state().len(), rows.nrows())?;
-        self.filter.absorb(rows.clone(), error, LinearObservation::noise(observation), |_, _, _, _| ())?;
+        self.filter.absorb(rows.clone(), error, observation.noise(), |_, _, _, _| ())?;
         Ok(())
     }
 }

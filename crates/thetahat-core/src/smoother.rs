@@ -92,6 +92,20 @@ struct Element<T: Real, N: Dimension> {
 }
 
 /// A state given all measurements.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+/// use thetahat_core::{Covariance, Error, KalmanFilter, LinearObservation, Smoother};
+///
+/// // One measurement of variance 1 and a prior of variance 1: half-way between, with half the variance.
+/// let one: Covariance<f64, Const<1>> = Covariance::from_diagonal(&Vector1::new(1.0))?;
+/// let gauge = LinearObservation::new(Matrix1::new(1.0), one.clone())?;
+/// let mut smoother = Smoother::new(KalmanFilter::new(Vector1::new(0.0), one)?);
+/// smoother.correct(&gauge, &Default::default(), &Vector1::new(4.0))?;
+/// let smoothed = &smoother.smooth()?[0];
+/// assert!((smoothed.state[0] - 2.0).abs() < 1e-14 && (smoothed.covariance[0] - 0.5).abs() < 1e-14);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Smoothed<T: Real, N: Dimension> {

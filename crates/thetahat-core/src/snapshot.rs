@@ -83,6 +83,18 @@ impl<T: Real> Entry for T {
     }
 }
 
+impl Entry for bool {
+    const BLANK: bool = false;
+
+    fn write<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.serialize(serializer)
+    }
+
+    fn read<'de, D: Deserializer<'de>>(deserializer: D) -> Result<bool, D::Error> {
+        bool::deserialize(deserializer)
+    }
+}
+
 /// Reads a number, or the word for one.
 struct Number<T>(PhantomData<T>);
 

@@ -23,7 +23,21 @@ use crate::{Dimension, Real};
 ///
 /// Source: Ljung, System Identification, 2nd ed., section 7.3 and appendix II.
 ///
-/// See [`LeastSquares::solve`](crate::LeastSquares::solve) for an example.
+/// ```
+/// use thetahat_core::nalgebra::{Const, Vector1};
+/// use thetahat_core::{Error, LeastSquares};
+///
+/// // A mean: (1 + 2 + 3)/3, with the residual variance 2/(3 - 1) and the standard error √(1/3).
+/// let mut rows = LeastSquares::<f64, Const<1>>::new();
+/// for y in [1.0, 2.0, 3.0] {
+///     rows.add(&Vector1::new(1.0), y)?;
+/// }
+/// let solution = rows.solve()?;
+/// assert!((solution.parameters()[0] - 2.0).abs() < 1e-14);
+/// assert!((solution.residual_variance().unwrap() - 1.0).abs() < 1e-14);
+/// assert!((solution.standard_errors().unwrap()[0] - 3f64.sqrt().recip()).abs() < 1e-14);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Solution<T: Real, N: Dimension> {
     pub(crate) parameters: OVector<T, N>,

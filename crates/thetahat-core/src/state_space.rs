@@ -37,11 +37,11 @@ use crate::{Covariance, Dimension, Error, Real};
 ///         Vector2::new(x[0] + self.sample_time * x[1], x[1] + self.sample_time * (u[0] - 9.81 * x[0].sin()))
 ///     }
 ///
-///     fn jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
+///     fn next_jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
 ///         Matrix2::new(1.0, self.sample_time, -self.sample_time * 9.81 * x[0].cos(), 1.0)
 ///     }
 ///
-///     fn noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
+///     fn process_noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
 ///         self.noise.clone()
 ///     }
 /// }
@@ -51,10 +51,10 @@ pub trait Transition<T: Real, N: Dimension, U: Dimension = Const<0>> {
     fn next(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OVector<T, N>;
 
     /// F = ∂f/∂x at x and u, n x n.
-    fn jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, N, N>;
+    fn next_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, N, N>;
 
     /// Q, the covariance of what the noise adds to the next state, n x n.
-    fn noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, N>;
+    fn process_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, N>;
 }
 
 /// What is measured of a state.
@@ -68,6 +68,48 @@ pub trait Transition<T: Real, N: Dimension, U: Dimension = Const<0>> {
 /// one sensor. N is the number of states, n, M that of elements of a measurement, m, and U that of inputs.
 ///
 /// [`LinearObservation`] is the linear one.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix2, RowVector2, SVector, Vector1, Vector2};
+/// use thetahat_core::{Covariance, Observation, Transition};
+///
+/// /// A pendulum with the gauge of its angle: one type is both.
+/// struct Pendulum {
+///     process_noise: Covariance<f64, Const<2>>,
+///     gauge_noise: Covariance<f64, Const<1>>,
+/// }
+///
+/// impl Transition<f64, Const<2>> for Pendulum {
+///     fn next(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Vector2<f64> {
+///         Vector2::new(x[0] + 0.1 * x[1], x[1] - 0.981 * x[0].sin())
+///     }
+///     fn next_jacobian(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Matrix2<f64> {
+///         Matrix2::new(1.0, 0.1, -0.981 * x[0].cos(), 1.0)
+///     }
+///     fn process_noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<2>> {
+///         self.process_noise.clone()
+///     }
+/// }
+///
+/// impl Observation<f64, Const<2>, Const<1>> for Pendulum {
+///     fn output(&self, x: &Vector2<f64>, _: &SVector<f64, 0>) -> Vector1<f64> {
+///         Vector1::new(x[0])
+///     }
+///     fn output_jacobian(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> RowVector2<f64> {
+///         RowVector2::new(1.0, 0.0)
+///     }
+///     fn measurement_noise(&self, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Covariance<f64, Const<1>> {
+///         self.gauge_noise.clone()
+///     }
+/// }
+///
+/// let pendulum = Pendulum { process_noise: Covariance::zero(Const), gauge_noise: Covariance::zero(Const) };
+/// let (x, none) = (Vector2::new(0.0, 1.0), SVector::zeros());
+/// assert_eq!(pendulum.output(&pendulum.next(&x, &none), &none), Vector1::new(0.1));
+/// assert_eq!(pendulum.output_jacobian(&x, &none) * pendulum.next_jacobian(&x, &none), RowVector2::new(1.0, 0.1));
+/// assert_eq!(pendulum.process_noise(&x, &none).variances(), Vector2::zeros());
+/// assert_eq!(pendulum.measurement_noise(&x, &none).variances(), Vector1::zeros());
+/// ```
 pub trait Observation<
     T: Real,
     N: Dimension + Dimension<M>,
@@ -79,10 +121,10 @@ pub trait Observation<
     fn output(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OVector<T, M>;
 
     /// H = ∂h/∂x at x and u, m x n.
-    fn jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N>;
+    fn output_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N>;
 
     /// R, the covariance of what the noise adds to the measurement, m x m.
-    fn noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, M>;
+    fn measurement_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, M>;
 }
 
 /// A linear transition.
@@ -201,11 +243,11 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> Transition<T, N, U> for
         next
     }
 
-    fn jacobian(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> OMatrix<T, N, N> {
+    fn next_jacobian(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> OMatrix<T, N, N> {
         self.state_matrix.clone()
     }
 
-    fn noise(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> Covariance<T, N> {
+    fn process_noise(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> Covariance<T, N> {
         self.noise.clone()
     }
 }
@@ -325,11 +367,11 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<U> + Dimensi
         output
     }
 
-    fn jacobian(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> OMatrix<T, M, N> {
+    fn output_jacobian(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> OMatrix<T, M, N> {
         self.output_matrix()
     }
 
-    fn noise(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> Covariance<T, M> {
+    fn measurement_noise(&self, _state: &OVector<T, N>, _input: &OVector<T, U>) -> Covariance<T, M> {
         self.noise.clone()
     }
 }

@@ -290,15 +290,22 @@ pub(crate) fn diagonal<T: Real>(factor: &[T], size: usize, index: usize) -> T {
 /// Writes `scale` P_jj for every j into `target`: the same sums, column by column. n² multiply-adds.
 #[inline(always)]
 pub(crate) fn diagonals<T: Real>(factor: &[T], scale: T, target: &mut [T]) {
-    let size = target.len();
-    for k in 0..size {
-        let weight = variance(factor, size, k) * scale;
-        let Some((before, [diagonal, ..])) = target.split_at_mut_checked(k) else { return };
-        for (sum, &entry) in before.iter_mut().zip(above(factor, size, k)) {
-            *sum += weight * entry * entry;
-        }
-        *diagonal = weight;
+    target.fill(T::zero());
+    for k in 0..target.len() {
+        add_squares(factor, scale, k, target);
     }
+}
+
+/// Adds what column k of U makes of `scale` P_jj, for every j.
+#[inline(always)]
+pub(crate) fn add_squares<T: Real>(factor: &[T], scale: T, k: usize, target: &mut [T]) {
+    let size = target.len();
+    let weight = variance(factor, size, k) * scale;
+    let Some((before, [diagonal, ..])) = target.split_at_mut_checked(k) else { return };
+    for (sum, &entry) in before.iter_mut().zip(above(factor, size, k)) {
+        *sum += weight * entry * entry;
+    }
+    *diagonal += weight;
 }
 
 /// Writes P into `matrix`, n³/3 multiply-adds. Each entry is added up where a compiler can keep it in a register, and

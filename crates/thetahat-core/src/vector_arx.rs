@@ -4,9 +4,10 @@ use nalgebra::{Const, OMatrix, OVector};
 
 use crate::arx::{check_samples, predict_ahead};
 use crate::error::check_length;
+use crate::rls::pass_on_settings;
 use crate::triangle::column;
 use crate::{
-    Action, ArxOrders, Covariance, Dimension, Error, Forgetting, Innovation, Lags, Real,
+    Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real,
     RecursiveLeastSquares, RlsStart,
 };
 
@@ -94,22 +95,28 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         Ok(RecursiveVectorArx { lags, estimator })
     }
 
+    /// The same as [`new`](RecursiveVectorArx::new) for orders that are constants, so that wrong sizes do not compile: see
+    /// [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
+    pub fn of<O: ConstantOrders>(
+        output_scales: &OVector<T, M>,
+        input_scales: &[T],
+        forgetting: Forgetting<T>,
+    ) -> Result<Self, Error> {
+        const {
+            let fits = match M::SIZE {
+                Some(outputs) => Self::fits(&O::ORDERS, outputs),
+                None => true,
+            };
+            assert!(fits, "N is not the number of parameters, or D is less than that of delays")
+        };
+        Self::new(&O::ORDERS, output_scales, input_scales, forgetting)
+    }
+
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
     /// Errors: none that can occur.
     pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
         Ok(RecursiveVectorArx { estimator: self.estimator.with_start(start)?, ..self })
-    }
-
-    /// The same with these parameters, N x M, to start from. See [`RecursiveLeastSquares::with_parameters`], whose errors
-    /// it has.
-    pub fn with_parameters(self, parameters: OMatrix<T, N, M>) -> Result<Self, Error> {
-        Ok(RecursiveVectorArx { estimator: self.estimator.with_parameters(parameters)?, ..self })
-    }
-
-    /// The same with this P to start from. See [`RecursiveLeastSquares::with_covariance`], whose errors it has.
-    pub fn with_covariance(self, covariance: Covariance<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveVectorArx { estimator: self.estimator.with_covariance(covariance)?, ..self })
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -175,6 +182,13 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         let taken = lags.sample(inputs, outputs.as_slice(), inputs_follow, |regressor| {
             estimator.take_all(regressor, outputs).ok()
         });
+        if let Some(Innovation { error, nis, action, .. }) = &taken
+            && let Some(unused) = estimator.unused(*nis, *action)
+        {
+            lags.take_from_newest(|index| {
+                error.as_slice().get(index).map_or(T::zero(), |&error| error * unused)
+            });
+        }
         taken.unwrap_or_else(|| {
             estimator.advance();
             let unknown = outputs.shape_generic().0.vector(T::NAN);
@@ -266,16 +280,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         self.lags.gap();
     }
 
-    /// Turns adaptation off, or on again. See [`RecursiveLeastSquares::set_adaptation`]. Samples are still taken in,
-    /// so that predictions go on.
-    pub fn set_adaptation(&mut self, on: bool) {
-        self.estimator.set_adaptation(on);
+    /// Sets the parameters: see [`RecursiveLeastSquares::set_parameters`], whose errors it has.
+    pub fn set_parameters(&mut self, parameters: OMatrix<T, N, M>) -> Result<(), Error> {
+        self.estimator.set_parameters(parameters)
     }
 
-    /// The least squares estimator: parameters, covariance, noise variances, excitation.
-    pub fn estimator(&self) -> &RecursiveLeastSquares<T, N, M> {
-        &self.estimator
-    }
+    pass_on_settings!(OMatrix<T, N, M>, RecursiveLeastSquares<T, N, M>);
 }
 
 #[cfg(feature = "serde")]

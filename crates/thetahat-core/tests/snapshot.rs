@@ -71,8 +71,7 @@ fn change_detector() {
     for (mean, variance) in [(2.0, 2.0), (f64::INFINITY, 1.5), (3.0, f64::INFINITY)] {
         check(ChangeDetector::new(mean, variance).expect("thresholds"), |detector, k| {
             let error = output(k);
-            let innovation =
-                Innovation { error, variance: 0.7, nis: error * error / 0.7, action: Action::Updated };
+            let innovation = Innovation::new(error, 0.7, error * error / 0.7, Action::Updated);
             detector.update(&innovation)
         });
     }
@@ -565,4 +564,11 @@ fn a_size_of_another_type_keeps_every_bit() {
     assert!(filter.covariance().write_into(&mut entries).is_err());
     filter.covariance().write_into(&mut entries[..4]).unwrap();
     assert_eq!(&entries[..4], filter.covariance().matrix().as_slice());
+}
+
+#[test]
+fn an_error_is_written_with_its_words() {
+    let error = Error::Length { argument: "state", expected: 2, found: 3 };
+    let written = serde_json::to_value(error).expect("a value");
+    assert_eq!(written, json!({ "Length": { "argument": "state", "expected": 2, "found": 3 } }));
 }

@@ -167,7 +167,7 @@ fn soak(name: &str, single: Forgetting<f32>, double: Forgetting<f64>, dead_zone:
     let findings = run(name, single, double, dead_zone, steps());
     assert!(findings.rounding < rounding, "{name}: {findings:?}");
     assert!(findings.error < 0.5, "{name}: {findings:?}");
-    // n samples pass before a variance has its turn at the cap: up to (1 + 1/n)^n.
+    // n samples pass before a column has its turn: up to (1 + 1/n)^n.
     assert!(findings.variance < 2.72, "{name}: {findings:?}");
 }
 

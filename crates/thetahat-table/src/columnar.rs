@@ -12,6 +12,7 @@ mod values;
 #[cfg(test)]
 mod tests;
 
+use std::collections::TryReserveError;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::mpsc::SyncSender;
@@ -128,7 +129,7 @@ impl ColumnarReader {
                 ),
             ));
         }
-        let (opened, schema) = Opened::new(path, bytes, format)?;
+        let (opened, schema) = Opened::new(path, bytes, format, options.bound)?;
         let columns = Columns::of(&file, &schema);
         if columns.names.is_empty() {
             return Err(columns.error("there are no columns; write at least one"));
@@ -165,13 +166,14 @@ impl ColumnarReader {
         let mut conversion = self.conversion(selection, None)?;
         let too_large = |values: usize| bound.and_then(|bound| bound.passed_by(values));
         let width = conversion.fields.len();
-        if let Some(words) = rows.and_then(|rows| too_large(rows.saturating_mul(width))) {
+        let whole = rows.filter(|_| most.is_none());
+        if let Some(words) = whole.and_then(|rows| too_large(rows.saturating_mul(width))) {
             return Err(conversion.too_large(&words));
         }
         let room = most.or(rows).unwrap_or(0);
         let mut part = Part::new(width, room);
         while let Some(batch) = conversion.batch()? {
-            conversion.append(&batch, &mut part)?;
+            conversion.append(&batch, &mut part, false)?;
             if let Some(fault) = part.first_fault() {
                 return Err(fault);
             }
@@ -231,7 +233,7 @@ impl ColumnarReader {
             );
             return Err(columns.error(message));
         }
-        let mut batches = opened.batches(&fields).map_err(|message| columns.error(message))?;
+        let mut batches = opened.batches(&fields)?;
         let first = loop {
             match batches.next() {
                 None => return Err(columns.error("there are no rows; record at least one")),
@@ -319,20 +321,25 @@ impl Conversion {
         }
     }
 
-    /// Appends the rows of a batch. Where a value is wrong it is NaN.
-    fn append(&mut self, batch: &RecordBatch, part: &mut Part) -> Result<(), Error> {
+    /// Appends the rows of a batch. Where a value is wrong it is NaN, and all faults are kept, or the first one of each column.
+    fn append(&mut self, batch: &RecordBatch, part: &mut Part, all: bool) -> Result<(), Error> {
         let Self { columns, fields, time, clock, rows, .. } = self;
         let start = part.rows;
         for ((index, array), values) in fields.iter().copied().zip(batch.columns()).zip(&mut part.columns) {
+            let full = |error: TryReserveError| Error::memory(&columns.file, None, &error.to_string());
+            let mut faults = 0;
             let mut fault = |row: usize, message: &str| {
-                part.faults.push((start + row, columns.fault(index, *rows + row as u64 + 1, message)));
+                if all || faults == 0 {
+                    part.faults.push((start + row, columns.fault(index, *rows + row as u64 + 1, message)));
+                }
+                faults += 1;
             };
             if Some(index) == *time {
                 let Some(clock) = clock else { continue };
-                clock.append(array.as_ref(), values, &mut fault);
+                clock.append(array.as_ref(), values, &mut fault).map_err(full)?;
                 continue;
             }
-            if numbers(array.as_ref(), values) {
+            if numbers(array.as_ref(), values).map_err(full)? {
                 let word = format!(
                     "{}: {} has whole numbers beyond 2^53, which are rounded to the nearest ones that 64 bits of floating \
                      point hold",
@@ -383,7 +390,7 @@ impl Conversion {
         loop {
             let mut part = Part::new(self.fields.len(), 0);
             let message = match self.batch() {
-                Ok(Some(batch)) => match self.append(&batch, &mut part) {
+                Ok(Some(batch)) => match self.append(&batch, &mut part, true) {
                     Ok(()) => Message::Piece(part),
                     Err(error) => Message::Failed(error),
                 },

@@ -1,6 +1,7 @@
 //! What went wrong while reading a log, and where.
 
 use std::fmt;
+use std::io;
 
 /// The longest piece of the log that a message repeats, in characters.
 const SHOWN: usize = 40;
@@ -23,6 +24,22 @@ pub struct Error {
     file: String,
     position: Option<Position>,
     message: String,
+}
+
+/// What to do where the system does not open a file, by its reason.
+///
+/// ```
+/// let error = std::fs::File::open("no/such.csv").unwrap_err();
+/// assert_eq!(thetahat_table::remedy(&error), "check the path and its permissions");
+/// ```
+pub fn remedy(error: &io::Error) -> &'static str {
+    // EMFILE and ENFILE, which have no kind of their own.
+    match error.raw_os_error() {
+        Some(24 | 23) if cfg!(unix) => {
+            "close other files or programs, or raise the limit of open files (`ulimit -n`)"
+        }
+        _ => "check the path and its permissions",
+    }
 }
 
 /// A place in a log, both numbers counted from one.
@@ -58,7 +75,7 @@ impl Error {
     }
 
     /// That the system has no thread for what reads a file.
-    pub(super) fn no_thread(file: &str, error: &std::io::Error) -> Self {
+    pub(super) fn no_thread(file: &str, error: &io::Error) -> Self {
         Self::io(
             file,
             format!(
@@ -145,6 +162,16 @@ mod tests {
         assert_eq!(error.to_string(), "a\\nb.csv:3:4: wrong");
         let error = Error::io("log.csv", "gone");
         assert_eq!(error.to_string(), "log.csv: gone");
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn too_many_open_files_have_a_remedy_of_their_own() {
+        for number in [23, 24] {
+            let remedy = remedy(&io::Error::from_raw_os_error(number));
+            assert!(remedy.contains("`ulimit -n`"), "{remedy}");
+        }
+        assert_eq!(remedy(&io::Error::from_raw_os_error(13)), "check the path and its permissions");
     }
 
     #[test]

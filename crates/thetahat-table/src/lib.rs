@@ -27,8 +27,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What is understood of texts: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; blank
-//! lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
+//! What is understood of texts: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; lines that end with LF,
+//! CR LF or CR; blank lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
 //! as seconds, as ISO 8601 or in a given format.
 //!
 //! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call it:
@@ -59,7 +59,7 @@ mod stream;
 mod tests;
 mod time;
 
-pub use error::{Error, ErrorKind};
+pub use error::{Error, ErrorKind, remedy};
 pub use formats::{Reader, Stream};
 pub use lines::Lines;
 pub use mailbox::{Event, Waker};

@@ -18,9 +18,14 @@ impl Bound {
         Self { per_value, free: free() }
     }
 
+    #[cfg(all(test, feature = "columnar"))]
+    pub(crate) fn of(per_value: u64, free: u64) -> Self {
+        Self { per_value, free: Some(free) }
+    }
+
     /// What this many values take, in words, if it is more than there is.
     pub(crate) fn passed_by(&self, values: usize) -> Option<String> {
-        let taken = values as u64 * self.per_value;
+        let taken = (values as u64).saturating_mul(self.per_value);
         let free = self.free.filter(|free| taken > *free)?;
         Some(format!(
             "{values} values take {} at {} bytes each, and {} are free",
@@ -28,6 +33,13 @@ impl Bound {
             self.per_value,
             said(free)
         ))
+    }
+
+    /// What this many bytes are that are held at once while rows are read, in words, if it is more than there is.
+    #[cfg(feature = "columnar")]
+    pub(crate) fn passed_by_bytes(&self, bytes: u64) -> Option<String> {
+        let free = self.free.filter(|free| bytes > *free)?;
+        Some(format!("one of its batches takes {} unpacked, and {} are free", said(bytes), said(free)))
     }
 }
 
@@ -50,7 +62,8 @@ fn group() -> Option<u64> {
         let read = |file: &str| fs::read_to_string(folder.join(file)).ok();
         let number = |file: &str| read(file)?.trim().parse::<u64>().ok();
         let files = || number_after(&read("memory.stat")?, "inactive_file");
-        Some((number("memory.max")? + files().unwrap_or(0)).saturating_sub(number("memory.current")?))
+        let most = number("memory.max")?.saturating_add(files().unwrap_or(0));
+        Some(most.saturating_sub(number("memory.current")?))
     };
     // Limits of the groups above hold as well. In a container the path may be that outside of it.
     let root = Path::new("/sys/fs/cgroup");
@@ -114,7 +127,12 @@ mod tests {
         assert_eq!(bound.passed_by(7000), None);
         let words = "10000 values take 1 MB at 128 bytes each, and 1 MB are free";
         assert_eq!(bound.passed_by(10_000).as_deref(), Some(words));
-        assert_eq!(Bound { free: None, ..bound }.passed_by(usize::MAX >> 8), None);
+        assert_eq!(Bound { free: None, ..bound }.passed_by(usize::MAX), None);
+        // More than 64 bits hold is more than there is.
+        for per_value in [128, u64::MAX] {
+            assert!(Bound { per_value, ..bound }.passed_by(usize::MAX).is_some());
+            assert!(Bound { per_value, ..bound }.passed_by(1 << 57).is_some());
+        }
     }
 
     #[test]

@@ -243,7 +243,7 @@ impl TextReader {
             // What is wrong with this block comes before what is wrong with the next.
             let taken = read?;
             if let Some(words) =
-                options.bound.and_then(|bound| bound.passed_by(rows.count * plan.fields.len()))
+                options.bound.and_then(|bound| bound.passed_by(rows.count.saturating_mul(plan.fields.len())))
             {
                 return Err(plan.layout.too_large(rows.line, &words));
             }

@@ -21,7 +21,7 @@ pub(super) struct Record {
 fn reader(delimiter: u8) -> Reader {
     ReaderBuilder::new()
         .delimiter(delimiter)
-        // A lone carriage return is no line break here: lines are counted by their newlines, everywhere.
+        // Lines are counted by their newlines, everywhere: the source has made one of a lone carriage return.
         .terminator(Terminator::Any(b'\n'))
         .build()
 }
@@ -91,8 +91,7 @@ impl Record {
                 ReadFieldResult::Field { record_end: true } => {
                     // Before the line break.
                     let line = &text[..start];
-                    let line = line.strip_suffix(b"\n").unwrap_or(line);
-                    return line.strip_suffix(b"\r").unwrap_or(line).len();
+                    return line.strip_suffix(b"\n").unwrap_or(line).len();
                 }
                 ReadFieldResult::OutputFull => {}
                 ReadFieldResult::InputEmpty | ReadFieldResult::End => break,
@@ -115,9 +114,9 @@ mod tests {
 
     #[test]
     fn quotes_are_removed_and_what_they_protect_is_kept() {
-        let (length, fields) = fields("\"a,\"\"b\"\"\nc\", 2,\"\"\r\n3,4\n");
-        assert_eq!(length, Some(19));
-        assert_eq!(fields, ["a,\"b\"\nc", " 2", "\r"]);
+        let (length, fields) = fields("\"a,\"\"b\"\"\nc\", 2,\"\"\n3,4\n");
+        assert_eq!(length, Some(18));
+        assert_eq!(fields, ["a,\"b\"\nc", " 2", ""]);
     }
 
     #[test]
@@ -138,7 +137,7 @@ mod tests {
 
     #[test]
     fn a_field_knows_where_it_started() {
-        let text = b"\"a,\"\"b\"\"\nc\", 2,3\r\n4,5\n";
+        let text = b"\"a,\"\"b\"\"\nc\", 2,3\n4,5\n";
         let mut record = Record::new(b',');
         record.read(text);
         let starts: Vec<_> = (0..4).map(|index| record.start_of(index, text)).collect();

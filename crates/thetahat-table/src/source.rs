@@ -10,7 +10,9 @@ use encoding_rs::{Encoding, UTF_8};
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::read::MultiGzDecoder;
 
-use super::error::Error;
+use memchr::memchr;
+
+use super::error::{Error, remedy};
 
 /// The first bytes of every gzip stream.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -71,10 +73,7 @@ impl Bytes {
             Ok((file, metadata))
         });
         match opened {
-            Err(error) => Err(Error::io(
-                &name,
-                format!("cannot be opened: {error}; check the path and its permissions"),
-            )),
+            Err(error) => Err(Error::io(&name, format!("cannot be opened: {error}; {}", remedy(&error)))),
             Ok((_, metadata)) if metadata.is_dir() => {
                 Err(Error::io(&name, "is a directory; name a file in it"))
             }
@@ -161,7 +160,7 @@ impl Source {
             .strip_bom(true)
             .bom_override(true)
             .build(bytes);
-        Self { name, text: Box::new(text), gzip, bytes_read, total }
+        Self { name, text: Box::new(LineEnds { text, after: false }), gzip, bytes_read, total }
     }
 
     /// The name that messages give it.
@@ -242,6 +241,41 @@ fn failure(name: &str, gzip: bool, error: &io::Error) -> Error {
         _ => format!("cannot be read: {error}"),
     };
     Error::io(name, message)
+}
+
+/// A text of which every line ends with a newline and nothing else, also where it ends with a carriage return alone.
+struct LineEnds<R> {
+    text: R,
+    /// Whether the last byte was a carriage return, for which a newline was given: one that follows is part of it.
+    after: bool,
+}
+
+impl<R: Read> Read for LineEnds<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let count = self.text.read(buffer)?;
+            // How much was taken, and how much of it was kept.
+            let mut taken =
+                usize::from(std::mem::take(&mut self.after) && buffer.first() == Some(&b'\n')).min(count);
+            let mut kept = 0;
+            while let Some(found) = memchr(b'\r', &buffer[taken..count]) {
+                buffer.copy_within(taken..taken + found, kept);
+                kept += found;
+                taken += found + 1;
+                buffer[kept] = b'\n';
+                kept += 1;
+                self.after = taken == count;
+                taken += usize::from(!self.after && buffer[taken] == b'\n');
+            }
+            if kept < taken {
+                buffer.copy_within(taken..count, kept);
+            }
+            kept += count - taken;
+            if kept > 0 || count == 0 {
+                return Ok(kept);
+            }
+        }
+    }
 }
 
 /// A stream that counts its bytes.

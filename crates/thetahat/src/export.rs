@@ -23,7 +23,7 @@
 //! let exported = export(&report, &plan, Some((&log, &[])))?;
 //! let names: Vec<&str> = exported.files.iter().map(|file| file.name.as_str()).collect();
 //! assert_eq!(names, ["plant.h", "plant.c", "plant.csv", "plant_test.c"]);
-//! assert!(exported.files[0].text.contains("void plant_predict(plant_state *self, const float u[1], float y[1]);"));
+//! assert!(exported.files[0].text.contains("unsigned int plant_predict(plant_state *self, const float u[1], float y[1]);"));
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
@@ -52,11 +52,11 @@ use crate::Error;
 use crate::control::Control;
 use crate::data::{Log, Rows};
 use crate::model::Model;
-use crate::report::Report;
+use crate::report::{Report, SAME_TIME};
 use controller::Controller;
 use head::Head;
 use program::Program;
-use vector::Vector;
+use vector::{Columns, Vector};
 
 /// A language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -266,24 +266,48 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
     Ok(Exported { files, warnings })
 }
 
-/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController).
+/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController). With rows of a log there is a test
+/// vector beside it, as [`export`] has it: in each row the controller gets the measurement, and then the input that acted. A log has no set point: it goes
+/// between the highest and the lowest measurement of the rows, every 25 of them.
 ///
 /// # Errors
 /// [`Error::Argument`] for a name that is none, and a plan for something else; [`Error::Report`] for coefficients that are none, and a working
-/// point that moves.
-pub fn export_controller(document: &Control, plan: &Plan) -> Result<Exported, Error> {
+/// point that moves; [`Error::Data`] for a log of another sample time, and for channels or rows that it does not have.
+pub fn export_controller(
+    document: &Control,
+    plan: &Plan,
+    log: Option<(&Log, &[Rows])>,
+) -> Result<Exported, Error> {
     check_name(&plan.name)?;
     if plan.purpose != Purpose::Controller {
         return Err(refused(plan.purpose, "a controller", "controller"));
     }
     let controller = Controller::new(document)?;
     plan.precision.check(controller.constants())?;
-    let head = Head::of_controller(document)?;
-    let files = match plan.language {
-        Language::C => c::files(&controller::program(&controller), &plan.name, plan.precision, &head),
+    let head = Head::of_controller(document, plan.language)?;
+    let (program, Plan { language, precision, name, .. }) = (controller::program(&controller), plan);
+    let mut files = match language {
+        Language::C => c::files(&program, name, *precision, &head),
         Language::Rust => vec![controller::rust(&controller, plan, &head)],
     };
-    Ok(Exported { files, warnings: Vec::new() })
+    let mut warnings = Vec::new();
+    if let Some((log, rows)) = log {
+        if (log.sample_time() / document.sample_time - 1.0).abs() > SAME_TIME {
+            return Err(Error::data(format!(
+                "the log's sample time is {} s, the controller's {} s; resample the log, or design a controller for it",
+                log.sample_time(),
+                document.sample_time
+            )));
+        }
+        let vector = Vector::along(&program, *precision, Columns::of_controller(document, log, rows)?)?;
+        files.push(vector.csv(name));
+        files.push(match language {
+            Language::C => c::check(&program, name, *precision, &vector),
+            Language::Rust => controller::rust_check(plan, &vector),
+        });
+        warnings.extend(vector.warning());
+    }
+    Ok(Exported { files, warnings })
 }
 
 /// The program of a model of any kind.

@@ -86,7 +86,7 @@ pub use requirement::{Demand, Requirement};
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};
 pub use state_space::{StateSpacePlan, fit_state_space, fit_state_space_monitored};
-pub(crate) use suited::check_sample_time;
+pub(crate) use suited::{SAME_TIME, check_sample_time};
 pub use validation::{
     Comparison, Coverage, InSample, NoiseLevel, OutputSignals, Signals, Validated, Validation,
     ValidationPlan, compare, validate,

@@ -42,7 +42,7 @@ mod warm;
 mod words;
 
 pub use forecasts::forecasts;
-pub use plan::{PerChannel, Policy, TrackMethod, TrackPlan, TrackStart};
+pub use plan::{PerChannel, Policy, TrackMethod, TrackOutliers, TrackPlan, TrackStart};
 pub use run_length::change_detector;
 pub use score::TrackScore;
 pub use summary::{TrackSummary, TrackerSummary};

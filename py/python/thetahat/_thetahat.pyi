@@ -414,6 +414,8 @@ class _RecursiveEstimator:
     @property
     def forgetting(self) -> Forgetting: ...
     @property
+    def outliers_in_a_row(self) -> int: ...
+    @property
     def adapting(self) -> bool: ...
     @adapting.setter
     def adapting(self, value: bool, /) -> None: ...
@@ -432,6 +434,9 @@ class RecursiveLeastSquares(_RecursiveEstimator):
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
     ) -> RecursiveLeastSquares: ...
     def update(self, phi: ArrayLike, y: ArrayLike) -> Innovation: ...
     def run(self, phi: ArrayLike, y: ArrayLike) -> RecursiveTrajectory: ...
@@ -479,6 +484,9 @@ class RecursiveArx(_RecursivePolynomials):
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveArx: ...
 
@@ -499,6 +507,9 @@ class RecursiveVectorArx(_RecursiveEstimator):
         blend: int | None = None,
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
     ) -> RecursiveVectorArx: ...
     def measured(self, y: ArrayLike) -> Innovation: ...
     def applied(self, u: ArrayLike) -> None: ...
@@ -572,14 +583,25 @@ class SelfTuner:
         probing: tuple[float, float] | None = None,
         sensor_range: tuple[float, float] | None = None,
         stuck_after: int = 0,
+        fallback: str | float = "hold",
+        excitation: float | None = None,
         start: str = "standard",
     ) -> SelfTuner: ...
     def control(self, set_point: float, y: float) -> float: ...
     def applied(self, u: float) -> None: ...
     def probe(self, share: float, samples: int) -> None: ...
     def set_adaptation(self, on: bool) -> None: ...
+    def set_gain_sign(self, sign: int) -> None: ...
+    def set_fallback(self, fallback: str | float) -> None: ...
+    def trust(self) -> None: ...
     @property
     def state(self) -> str: ...
+    @property
+    def distrust(self) -> str | None: ...
+    @property
+    def innovation(self) -> Innovation: ...
+    @property
+    def design_age(self) -> int: ...
     @property
     def a(self) -> _Array: ...
     @property
@@ -611,6 +633,9 @@ class RecursiveArmax(_RecursivePolynomials):
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveArmax: ...
     @property
@@ -632,6 +657,9 @@ class RecursiveOutputError(_RecursivePolynomials):
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveOutputError: ...
     @property
@@ -681,6 +709,9 @@ class RecursiveNarx(_RecursiveModel):
         parameters: ArrayLike | None = None,
         covariance: ArrayLike | None = None,
         dead_zone: float = 0.0,
+        huber: float = ...,
+        gate: float = ...,
+        release: int = 0,
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveNarx: ...
     @staticmethod

@@ -85,6 +85,10 @@ class Tracker:
         "mixed:SAMPLES" (standard, then blended into exact).
     dead_zone : float, optional
         An innovation of at most this size corrects nothing, in units of the output.
+    outliers : str, optional
+        What becomes of rows whose innovations are far larger than the noise makes them: "used"; "huber:THRESHOLD", where one of more
+        than THRESHOLD standard deviations corrects as one of so many; "gate:NIS:RELEASE", where one whose normalised square is
+        above NIS corrects nothing, until RELEASE of them came in a row. "huber" is "huber:3", "gate" is "gate:25:20". "used" if not given.
     horizon : int, optional
         Forecast the output this many rows later in each row, inputs held at their last value.
     alarm : float, optional
@@ -148,6 +152,7 @@ class Tracker:
         forgetting: Policy | Sequence[Policy] = 0.99,
         start: str | None = None,
         dead_zone: float | None = None,
+        outliers: str | None = None,
         horizon: int | None = None,
         alarm: float | None = None,
         sample_time: Duration | None = None,
@@ -177,7 +182,7 @@ class Tracker:
         if not isinstance(constant, bool):
             raise TypeError(f"constant: expected True or False, found {constant!r}")
         words += ["--constant"] if constant else []
-        spoken = (("method", method), ("start", start), ("couple", couple))
+        spoken = (("method", method), ("start", start), ("outliers", outliers), ("couple", couple))
         words += [f"--{name}={_options.text(name, value)}" for name, value in spoken if value is not None]
         words.append(f"--forgetting={','.join(_policies(forgetting))}")
         for name, values in (("offset", offset), ("scale", scale)):

@@ -47,6 +47,15 @@ use super::recursive_model::{
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size corrects nothing.
+/// huber : float, default inf
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
+///     3 loses next to nothing where there are no outliers.
+/// gate : float, default inf
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
+///     deviations. Huber's bound or a gate, not both.
+/// release : int, default 0
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
+///     but for what the noise variance learns of them.
 /// limits : sequence, optional
 ///     A pair (lower, upper) or None for each parameter of A, B and the constant, such as the sign of a gain that a controller divides by. What an
 ///     update leads out is taken back to the nearest point within, in the metric of P, so that the other parameters make up
@@ -87,13 +96,14 @@ impl RecursiveArmax {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveArmax {
     #[new]
     #[pyo3(signature = (na, nb, nc, nk = None, forgetting = STANDARD, *, method = "extended-least-squares",
         constant = false, output_scale = 1.0, input_scales = None, noise_scale = 1.0, parameters = None, covariance = None,
-        dead_zone = 0.0, limits = None))]
+        dead_zone = 0.0, huber = f64::INFINITY, gate = f64::INFINITY, release = Whole(0), limits = None))]
     #[pyo3(
-        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', constant=False, output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0, limits=None)"
+        text_signature = "(na, nb, nc, nk=1, forgetting=0.99, *, method='extended-least-squares', constant=False, output_scale=1.0, input_scales=None, noise_scale=1.0, parameters=None, covariance=None, dead_zone=0.0, huber=1e999, gate=1e999, release=0, limits=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -111,6 +121,9 @@ impl RecursiveArmax {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        huber: f64,
+        gate: f64,
+        release: Whole,
         limits: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let one = 1_u8.into_pyobject(py)?.into_any();
@@ -127,8 +140,9 @@ impl RecursiveArmax {
                 )));
             }
         };
+        let outliers = recursive::outliers(huber, gate, release)?;
         let stepper = Armax::new(&orders, method, output_scale, &scales, noise_scale, forgetting.0)
-            .and_then(|stepper| stepper.with_dead_zone(dead_zone))
+            .and_then(|stepper| stepper.with_dead_zone(dead_zone)?.with_outliers(outliers))
             .map_err(|error| failed(py, error))?;
         let limited = orders.parameters() - orders.nc;
         let given = StartingPoint { parameters, covariance, limits, limited };

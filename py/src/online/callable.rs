@@ -225,11 +225,13 @@ pub(crate) enum Trouble {
 }
 
 impl Trouble {
-    /// As an exception; what a function raises stays as it is.
+    /// As an exception, of a row that is given from 0; what a function raises stays as it is.
     pub(crate) fn into_error(self, row: Option<usize>) -> PyErr {
         match (self, row) {
             (Trouble::Raised(error), _) => error,
-            (Trouble::Said(message), Some(row)) => PyValueError::new_err(format!("row {row}: {message}")),
+            (Trouble::Said(message), Some(row)) => {
+                PyValueError::new_err(format!("row {}: {message}", row + 1))
+            }
             (Trouble::Said(message), None) => PyValueError::new_err(message),
         }
     }
@@ -385,11 +387,11 @@ impl Transition<f64, Dyn, Dyn> for Called<'_, '_> {
         self.guarded_value(state, input)
     }
 
-    fn jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
+    fn next_jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
         self.derivative(state, input)
     }
 
-    fn noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn process_noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
         self.covariance(state, input)
     }
 }
@@ -399,11 +401,11 @@ impl Observation<f64, Dyn, Dyn, Dyn> for Called<'_, '_> {
         self.guarded_value(state, input)
     }
 
-    fn jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
+    fn output_jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
         self.derivative(state, input)
     }
 
-    fn noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn measurement_noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
         self.covariance(state, input)
     }
 }

@@ -83,6 +83,7 @@ fn monic(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RstController {
     #[new]
     #[pyo3(signature = (r, s, gain, observer = None, *, limits = None))]
@@ -154,12 +155,9 @@ impl RstController {
         let orders =
             PlacementOrders { na: a.len().saturating_sub(1), nb: b.len().saturating_sub(1), integrator };
         argument::check_size("a and b: the coefficients of the controller", orders.size())?;
-        let wanted = WantedPoles {
-            response: response.as_slice(),
-            observer: observer.as_slice(),
-            integrator,
-            cancel_zeros,
-        };
+        let wanted = WantedPoles::new(response.as_slice(), observer.as_slice())
+            .with_integrator(integrator)
+            .with_cancelled_zeros(cancel_zeros);
         let placed = Stepper::pole_placement(a.as_slice(), b.as_slice(), &wanted);
         Self::limited(py, placed.map_err(|error| failed(py, error))?, limits)
     }

@@ -221,6 +221,7 @@ impl ChangeDetector {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl ChangeDetector {
     #[new]
     #[pyo3(signature = (interval, outputs = Whole(1)), text_signature = "(interval, outputs=1)")]
@@ -324,7 +325,7 @@ impl ChangeDetector {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a shape is wrong, or an innovation infinite; the message names the row, from 0. Nothing has changed then.
+    ///     If a shape is wrong, or an innovation infinite; the message names the row, from 1. Nothing has changed then.
     #[pyo3(signature = (errors, variances, *, nis = None))]
     fn run(
         &mut self,
@@ -352,7 +353,7 @@ impl ChangeDetector {
         };
         for (argument, values, columns) in [("errors", errors, outputs), ("nis", nis, 1)] {
             if let Some(place) = values.iter().position(|value| value.is_infinite()) {
-                let row = place / columns;
+                let row = place / columns + 1;
                 return Err(PyValueError::new_err(format!("row {row}: {argument} is infinite")));
             }
         }
@@ -362,12 +363,8 @@ impl ChangeDetector {
         results.write(|[mut statistics]| {
             py.detach(|| {
                 let mut pulse = Pulse::new(8 + outputs);
-                let mut innovation = Kept {
-                    error: DVector::zeros(outputs),
-                    variance: DVector::zeros(outputs),
-                    nis: 0.0,
-                    action: Action::Updated,
-                };
+                let mut innovation =
+                    Kept::new(DVector::zeros(outputs), DVector::zeros(outputs), 0.0, Action::Updated);
                 for row in 0..rows {
                     pulse.check()?;
                     innovation.error.as_mut_slice().copy_from_slice(argument::row(errors, row, outputs));

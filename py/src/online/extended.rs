@@ -141,6 +141,7 @@ pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, wanted: Option<usize>) -> 
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl ExtendedKalmanFilter {
     #[new]
     #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0), iterations = Whole(1)))]
@@ -266,7 +267,7 @@ impl ExtendedKalmanFilter {
     /// Raises
     /// ------
     /// ValueError, EstimationError
-    ///     As for one step; the message names the row, from 0. Nothing has changed then.
+    ///     As for one step; the message names the row, from 1. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
     #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]

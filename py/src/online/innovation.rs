@@ -22,10 +22,10 @@ use crate::array;
 /// nis : float
 ///     The normalised innovation squared, e' S^-1 e. 0 if nothing was measured, or the variance is not known.
 /// action : str
-///     "updated"; "capped": updated, and a variance brought back to its bound; "projected": updated by a shorter
+///     "updated"; "capped": updated, and a variance at its bound, where nothing is forgotten; "projected": updated by a shorter
 ///     step; "missing"; "not ready": the delay lines are not filled; "collecting": there is no estimate yet;
 ///     "frozen": adaptation is off; "skipped": in the dead zone; "gated": above the gate;
-///     "released": above it too, but used, as so many before it were.
+///     "released": above it too, but used, as so many before it were; "bounded": an outlier, which corrects by less than it asks for.
 /// log_likelihood : float
 ///     -1/2 (m ln 2 pi + ln det S + e' S^-1 e) for the m elements measured; 0 if nothing was measured.
 ///
@@ -57,18 +57,16 @@ impl Innovation {
     pub(crate) fn single(innovation: &Kept<f64, DVector<f64>>) -> Self {
         let first = |values: &DVector<f64>| values.as_slice().first().copied().unwrap_or(f64::NAN);
         let (error, variance) = (first(&innovation.error), first(&innovation.variance));
-        Kept { error, variance, nis: innovation.nis, action: innovation.action }.into()
+        Kept::new(error, variance, innovation.nis, innovation.action).into()
     }
 
     /// One element for each output.
     pub(crate) fn elements(&self) -> Kept<f64, DVector<f64>> {
         match &self.value {
-            Value::Number(Kept { error, variance, nis, action }) => Kept {
-                error: DVector::from_element(1, *error),
-                variance: DVector::from_element(1, *variance),
-                nis: *nis,
-                action: *action,
-            },
+            Value::Number(Kept { error, variance, nis, action, .. }) => {
+                let [error, variance] = [*error, *variance].map(|value| DVector::from_element(1, value));
+                Kept::new(error, variance, *nis, *action)
+            }
             Value::Vector(innovation) => innovation.clone(),
         }
     }
@@ -78,14 +76,14 @@ impl Innovation {
             kept.extract()?;
         let action = action(&name)?;
         if let (Ok(error), Ok(variance)) = (error.extract(), variance.extract()) {
-            return Ok(Kept { error, variance, nis, action }.into());
+            return Ok(Kept::new(error, variance, nis, action).into());
         }
         let values = |argument, value| -> PyResult<DVector<f64>> {
             let array = array::vector(argument, value, None)?;
             Ok(DVector::from_column_slice(array.as_slice()?))
         };
         let (error, variance) = (values("error", &error)?, values("variance", &variance)?);
-        Ok(Innovation::vector(Kept { error, variance, nis, action }))
+        Ok(Innovation::vector(Kept::new(error, variance, nis, action)))
     }
 }
 
@@ -152,7 +150,7 @@ impl Innovation {
 }
 
 /// All actions, in the order of their codes.
-const ACTIONS: [Action; 10] = [
+const ACTIONS: [Action; 11] = [
     Action::Updated,
     Action::Capped,
     Action::Projected,
@@ -163,6 +161,7 @@ const ACTIONS: [Action; 10] = [
     Action::Skipped,
     Action::Gated,
     Action::Released,
+    Action::Bounded,
 ];
 
 /// The place of an action among them.
@@ -178,6 +177,7 @@ pub(crate) fn code(action: Action) -> u8 {
         Action::Skipped => 7,
         Action::Gated => 8,
         Action::Released => 9,
+        Action::Bounded => 10,
         _ => u8::MAX,
     }
 }

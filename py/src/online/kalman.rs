@@ -217,6 +217,7 @@ fn with_same_inputs(
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl KalmanFilter {
     #[new]
     #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0)))]
@@ -363,7 +364,7 @@ impl KalmanFilter {
     /// Raises
     /// ------
     /// ValueError, EstimationError
-    ///     As for one step; the message names the row, from 0. Nothing has changed then.
+    ///     As for one step; the message names the row, from 1. Nothing has changed then.
     #[pyo3(signature = (transition, observation, measurements, *, inputs = None, cross_covariance = None))]
     fn run(
         &mut self,

@@ -52,6 +52,15 @@ impl<N: Dimension + Dimension<M>, M: Dimension> Around<N, M> for Stepper<f64, N,
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size corrects nothing.
+/// huber : float, default inf
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
+///     3 loses next to nothing where there are no outliers.
+/// gate : float, default inf
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
+///     deviations. Huber's bound or a gate, not both.
+/// release : int, default 0
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
+///     but for what the noise variance learns of them.
 ///
 /// Raises
 /// ------
@@ -163,12 +172,13 @@ fn run_sized<N: Dimension + Dimension<Const<1>>>(
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveLeastSquares {
     #[new]
     #[pyo3(signature = (n, forgetting = STANDARD, *, scales = None, outputs = Whole(1), start = "standard",
-        blend = None, parameters = None, covariance = None, dead_zone = 0.0))]
+        blend = None, parameters = None, covariance = None, dead_zone = 0.0, huber = f64::INFINITY, gate = f64::INFINITY, release = Whole(0)))]
     #[pyo3(
-        text_signature = "(n, forgetting=0.99, *, scales=None, outputs=1, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0)"
+        text_signature = "(n, forgetting=0.99, *, scales=None, outputs=1, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0, huber=1e999, gate=1e999, release=0)"
     )]
     #[expect(clippy::too_many_arguments, reason = "all but two are options, given by name")]
     fn new(
@@ -182,6 +192,9 @@ impl RecursiveLeastSquares {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        huber: f64,
+        gate: f64,
+        release: Whole,
     ) -> PyResult<Self> {
         let (n, outputs) = (argument::size("n", n)?, argument::size("outputs", outputs)?);
         let scales = match scales {
@@ -189,6 +202,7 @@ impl RecursiveLeastSquares {
             None => DVector::from_element(n, 1.0),
         };
         let start = recursive::start(start, blend, parameters.is_some() || covariance.is_some())?;
+        let outliers = recursive::outliers(huber, gate, release)?;
         let parameters = match parameters {
             Some(parameters) if outputs == 1 => {
                 Some(array::finite_vector("parameters", parameters, Some(n))?.as_slice().to_vec())
@@ -205,12 +219,12 @@ impl RecursiveLeastSquares {
         };
         let engine = if outputs == 1 {
             Stepper::new(&scales, forgetting.0)
-                .and_then(|estimator| estimator.with_start(start))
+                .and_then(|estimator| estimator.with_start(start)?.with_outliers(outliers))
                 .and_then(|estimator| warm(estimator, Const, parameters, covariance, dead_zone))
                 .map(Engine::One)
         } else {
             Stepper::with_outputs(&scales, Dyn(outputs), forgetting.0)
-                .and_then(|estimator| estimator.with_start(start))
+                .and_then(|estimator| estimator.with_start(start)?.with_outliers(outliers))
                 .and_then(|estimator| warm(estimator, Dyn(outputs), parameters, covariance, dead_zone))
                 .map(Engine::Many)
         };
@@ -278,7 +292,7 @@ impl RecursiveLeastSquares {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `update`; the message names the row, from 0. Nothing has changed then.
+    ///     As for `update`; the message names the row, from 1. Nothing has changed then.
     fn run(
         &mut self,
         py: Python<'_>,
@@ -416,6 +430,15 @@ impl RecursiveLeastSquares {
             Engine::Many(estimator) => estimator.forgetting(),
         };
         Forgetting { policy }
+    }
+
+    /// How many of the latest samples are outliers by the rule for them, since the last one that is not.
+    #[getter]
+    fn outliers_in_a_row(&self) -> u16 {
+        match &self.engine {
+            Engine::One(estimator) => estimator.outliers_in_a_row(),
+            Engine::Many(estimator) => estimator.outliers_in_a_row(),
+        }
     }
 
     /// Whether samples correct the estimate. Set it to turn that off and on.

@@ -38,11 +38,13 @@ impl Limits {
     /// What became of a sample once `keep` has taken the parameters back to their limits.
     pub(crate) fn after(
         &self,
-        innovation: Innovation<f64>,
+        mut innovation: Innovation<f64>,
         keep: impl FnOnce(&[RangeInclusive<f64>]) -> Result<bool, Error>,
     ) -> Result<Innovation<f64>, Error> {
-        let projected = !self.0.is_empty() && keep(&self.0)?;
-        Ok(if projected { Innovation { action: Action::Projected, ..innovation } } else { innovation })
+        if !self.0.is_empty() && keep(&self.0)? {
+            innovation.action = Action::Projected;
+        }
+        Ok(innovation)
     }
 
     /// The ranges; empty if there are none.

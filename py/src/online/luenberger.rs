@@ -58,6 +58,7 @@ pub(crate) struct LuenbergerObserver {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl LuenbergerObserver {
     #[new]
     fn new(py: Python<'_>, state: &Bound<'_, PyAny>, gain: &Bound<'_, PyAny>) -> PyResult<Self> {

@@ -46,6 +46,15 @@ use crate::model::Model;
 ///     P to start from, in units of the noise variance of the scaled output.
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size, in the unit of the output, corrects nothing.
+/// huber : float, default inf
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
+///     3 loses next to nothing where there are no outliers.
+/// gate : float, default inf
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
+///     deviations. Huber's bound or a gate, not both.
+/// release : int, default 0
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
+///     but for what the noise variance learns of them.
 /// limits : sequence, optional
 ///     A pair (lower, upper) or None for each parameter.
 ///
@@ -95,13 +104,14 @@ fn stepper<'a>(model: &'a PyRef<'_, RecursiveNarx>) -> PyResult<&'a Narx> {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveNarx {
     #[new]
     #[pyo3(signature = (ny, nu, nk = None, forgetting = STANDARD, *, degree = None, terms = None, output_offset = 0.0,
         output_scale = 1.0, input_offsets = None, input_scales = None, start = "standard", blend = None, parameters = None,
-        covariance = None, dead_zone = 0.0, limits = None))]
+        covariance = None, dead_zone = 0.0, huber = f64::INFINITY, gate = f64::INFINITY, release = Whole(0), limits = None))]
     #[pyo3(
-        text_signature = "(ny, nu, nk=1, forgetting=0.99, *, degree=2, terms=None, output_offset=0.0, output_scale=1.0, input_offsets=None, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0, limits=None)"
+        text_signature = "(ny, nu, nk=1, forgetting=0.99, *, degree=2, terms=None, output_offset=0.0, output_scale=1.0, input_offsets=None, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, dead_zone=0.0, huber=1e999, gate=1e999, release=0, limits=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -121,6 +131,9 @@ impl RecursiveNarx {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        huber: f64,
+        gate: f64,
+        release: Whole,
         limits: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let one = 1_u8.into_pyobject(py)?.into_any();
@@ -153,9 +166,10 @@ impl RecursiveNarx {
             offsets.into_iter().zip(scales).map(|(offset, scale)| Scaling { offset, scale }).collect();
         let output = Scaling { offset: output_offset, scale: output_scale };
         let start = recursive::start(start, blend, parameters.is_some() || covariance.is_some())?;
+        let outliers = recursive::outliers(huber, gate, release)?;
         let functions = Functions::new(map, regressors).map_err(|error| error::batch(py, error))?;
         let stepper = Narx::new(functions, &orders, output, &scalings, forgetting.0)
-            .and_then(|stepper| stepper.with_start(start)?.with_dead_zone(dead_zone))
+            .and_then(|stepper| stepper.with_start(start)?.with_dead_zone(dead_zone)?.with_outliers(outliers))
             .map_err(|error| failed(py, error))?;
         let limited = stepper.estimator().parameters().len();
         let given = StartingPoint { parameters, covariance, limits, limited };

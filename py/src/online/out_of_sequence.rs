@@ -69,6 +69,7 @@ pub(crate) struct OutOfSequenceFilter {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl OutOfSequenceFilter {
     #[new]
     #[pyo3(signature = (state, covariance, *, samples, outputs = Whole(1), inputs = Whole(0), gate = f64::INFINITY,

@@ -45,6 +45,16 @@ use super::recursive_model::{
 ///     P to start from, in units of the noise variance.
 /// dead_zone : float, default 0.0
 ///     An error of at most this size corrects nothing.
+/// huber : float, default inf
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
+///     3 loses next to nothing where there are no outliers.
+/// gate : float, default inf
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
+///     deviations. Huber's bound or a gate, not both; with the method "instruments"
+///     neither, as the noise variance is not known.
+/// release : int, default 0
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
+///     but for what the noise variance learns of them.
 /// limits : sequence, optional
 ///     A pair (lower, upper) or None for each parameter, as for `RecursiveArx`.
 ///
@@ -89,12 +99,13 @@ impl RecursiveOutputError {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveOutputError {
     #[new]
     #[pyo3(signature = (nf, nb, nk = None, forgetting = STANDARD, *, method = "prediction-error", constant = false,
-        output_scale = 1.0, input_scales = None, parameters = None, covariance = None, dead_zone = 0.0, limits = None))]
+        output_scale = 1.0, input_scales = None, parameters = None, covariance = None, dead_zone = 0.0, huber = f64::INFINITY, gate = f64::INFINITY, release = Whole(0), limits = None))]
     #[pyo3(
-        text_signature = "(nf, nb, nk=1, forgetting=0.99, *, method='prediction-error', constant=False, output_scale=1.0, input_scales=None, parameters=None, covariance=None, dead_zone=0.0, limits=None)"
+        text_signature = "(nf, nb, nk=1, forgetting=0.99, *, method='prediction-error', constant=False, output_scale=1.0, input_scales=None, parameters=None, covariance=None, dead_zone=0.0, huber=1e999, gate=1e999, release=0, limits=None)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -110,6 +121,9 @@ impl RecursiveOutputError {
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
         dead_zone: f64,
+        huber: f64,
+        gate: f64,
+        release: Whole,
         limits: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let one = 1_u8.into_pyobject(py)?.into_any();
@@ -126,8 +140,9 @@ impl RecursiveOutputError {
                 )));
             }
         };
+        let outliers = recursive::outliers(huber, gate, release)?;
         let stepper = OutputError::new(&orders, method, output_scale, &scales, forgetting.0)
-            .and_then(|stepper| stepper.with_dead_zone(dead_zone))
+            .and_then(|stepper| stepper.with_dead_zone(dead_zone)?.with_outliers(outliers))
             .map_err(|error| failed(py, error))?;
         let given = StartingPoint { parameters, covariance, limits, limited: orders.parameters() };
         RecursiveModel::new(py, Stepper::OutputError(stepper), inputs.len(), &given).map(Self::over)

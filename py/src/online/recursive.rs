@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
-use thetahat_core::{Action, Dimension, Error, Innovation, RecursiveLeastSquares, RlsStart};
+use thetahat_core::{Action, Dimension, Error, Innovation, Outliers, RecursiveLeastSquares, RlsStart};
 
 use super::argument::{Whole, count, reserve, shaped};
 use super::results::{Column, Results};
@@ -263,6 +263,25 @@ pub(crate) fn start(name: &str, blend: Option<Whole>, warm: bool) -> PyResult<Rl
         return Err(PyValueError::new_err(message));
     }
     Ok(start)
+}
+
+/// The rule for outliers: Huber's, a gate, or none.
+pub(crate) fn outliers(huber: f64, gate: f64, release: Whole) -> PyResult<Outliers<f64>> {
+    let wrong = |message: &str| Err(PyValueError::new_err(message.to_owned()));
+    for (name, value) in [("huber", huber), ("gate", gate)] {
+        if value.is_nan() || value < 1.0 {
+            return wrong(&format!("{name}: expected a number of 1 or more, or inf, found {value}"));
+        }
+    }
+    let release = count("release", release, 0, usize::from(u16::MAX))?;
+    let release = u16::try_from(release).unwrap_or(u16::MAX);
+    match (huber.is_finite(), gate.is_finite()) {
+        (true, true) => wrong("huber: expected inf, as a gate is given"),
+        (_, false) if release > 0 => wrong("release: expected 0, as there is no gate"),
+        (true, false) => Ok(Outliers::Huber { threshold: huber }),
+        (false, true) => Ok(Outliers::Gate { nis: gate, release }),
+        (false, false) => Ok(Outliers::Used),
+    }
 }
 
 /// The numbers of an iterator as an array.

@@ -250,6 +250,7 @@ pub(crate) fn future<'py>(
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveModel {
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were `applied` before.
     ///
@@ -348,7 +349,7 @@ impl RecursiveModel {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `log_row`; the message names the row, from 0. Nothing has changed then.
+    ///     As for `log_row`; the message names the row, from 1. Nothing has changed then.
     #[pyo3(signature = (y, *, u = None))]
     fn run(
         &mut self,
@@ -459,6 +460,12 @@ impl RecursiveModel {
         self.engine.limits.pairs()
     }
 
+    /// How many of the latest samples are outliers by the rule for them, since the last one that is not.
+    #[getter]
+    fn outliers_in_a_row(&self) -> u16 {
+        self.estimator().outliers_in_a_row()
+    }
+
     /// Whether samples correct the estimate. Set it to turn that off and on; samples are taken in all the same.
     #[getter]
     fn adapting(&self) -> bool {
@@ -486,6 +493,7 @@ impl RecursiveModel {
 pub(crate) struct RecursivePolynomials;
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursivePolynomials {
     /// A(q): 1, a_1 ... a_na; of an output-error model 1.
     #[getter]

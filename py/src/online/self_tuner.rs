@@ -5,13 +5,14 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::Dyn;
 use thetahat_core::{
-    IndirectSelfTuner, Probing, RecursiveArmax, ResponseWanted, RlsStart, Sensor, TunerOrders, TunerSettings,
-    TunerState,
+    Fallback, IndirectSelfTuner, Probing, RecursiveArmax, ResponseWanted, RlsStart, Sensor, Supervision,
+    TunerOrders, TunerSettings, TunerState,
 };
 
 use super::argument::{self, Whole, count, failed};
 use super::controller::RstController;
 use super::forgetting::{Memory, STANDARD};
+use super::innovation::Innovation;
 use super::{Reduced, snapshot};
 
 /// Without noise parameters that of an ARX model, to the bit.
@@ -51,6 +52,11 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 ///     What the sensor can measure. What is beyond is taken as the end of the range.
 /// stuck_after : int, default 0
 ///     So many equal measurements in a row are those of a sensor that is stuck; 0 if a working one repeats itself.
+/// fallback : {"hold", "last good"} or float, default "hold"
+///     What acts while the tuner is not trusted: the mean input of the latest 64 sound samples, the controller of
+///     these, or this input.
+/// excitation : float, optional
+///     The amplitude that excites the plant then: a tenth of the input's scale. With 0 trust may not come back by itself.
 /// start : {"standard", "exact"}, default "standard"
 ///     As for `RecursiveLeastSquares`; only "standard" with `nc` above 0.
 ///
@@ -67,7 +73,14 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 ///
 /// A measurement that is NaN is missing: the controller goes on with what its model predicts, for 100 samples, and then holds the input. A design is taken
 /// only where the peaks of its sensitivities with the model are below 2; slower responses are tried in turn, and the last good controller
-/// stays otherwise. The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up to the limits.
+/// stays otherwise.
+///
+/// Where designs are refused for long, the input goes from limit to limit, or the model predicts worse than the latest
+/// measurement does, the tuner is not trusted: `distrust` says why, the fallback acts (the last controller, where it is
+/// only old), and the model goes on learning. It controls again by itself where that makes it good again; a sign that
+/// is wrong is given anew by `set_gain_sign`.
+///
+/// The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up to the limits.
 ///
 /// References
 /// ----------
@@ -88,14 +101,35 @@ pub(crate) struct SelfTuner {
     pub(super) tuner: Stepper,
 }
 
+fn sign_of(sign: Whole) -> PyResult<f64> {
+    match sign.0 {
+        -1 => Ok(-1.0),
+        0 => Ok(0.0),
+        1 => Ok(1.0),
+        _ => Err(PyValueError::new_err("gain_sign: expected -1, 0 or 1")),
+    }
+}
+
+fn fallback_of(given: &Bound<'_, PyAny>) -> PyResult<Fallback<f64>> {
+    if let Ok(input) = given.extract::<f64>() {
+        return Ok(Fallback::Input(input));
+    }
+    match given.extract::<String>().as_deref() {
+        Ok("hold") => Ok(Fallback::Hold),
+        Ok("last good") => Ok(Fallback::LastGood),
+        _ => Err(PyValueError::new_err("fallback: expected 'hold', 'last good' or an input")),
+    }
+}
+
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl SelfTuner {
     #[new]
     #[pyo3(signature = (na, nb, *, nc = Whole(0), frequency, limits, damping = 0.8, observer = 0.3, input = None, output_scale = 1.0, input_scale = 1.0,
         gain_sign = Whole(0), forgetting = STANDARD, constant = true, integrator = true, probing = None, sensor_range = None,
-        stuck_after = Whole(0), start = "standard"))]
+        stuck_after = Whole(0), fallback = None, excitation = None, start = "standard"))]
     #[pyo3(
-        text_signature = "(na, nb, *, nc=0, frequency, limits, damping=0.8, observer=0.3, input=None, output_scale=1.0, input_scale=1.0, gain_sign=0, forgetting=0.99, constant=True, integrator=True, probing=None, sensor_range=None, stuck_after=0, start='standard')"
+        text_signature = "(na, nb, *, nc=0, frequency, limits, damping=0.8, observer=0.3, input=None, output_scale=1.0, input_scale=1.0, gain_sign=0, forgetting=0.99, constant=True, integrator=True, probing=None, sensor_range=None, stuck_after=0, fallback='hold', excitation=None, start='standard')"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -117,15 +151,12 @@ impl SelfTuner {
         probing: Option<(f64, f64)>,
         sensor_range: Option<(f64, f64)>,
         stuck_after: Whole,
+        fallback: Option<&Bound<'_, PyAny>>,
+        excitation: Option<f64>,
         start: &str,
     ) -> PyResult<Self> {
         let (na, nb, nc) = (count("na", na, 0, 64)?, count("nb", nb, 1, 64)?, count("nc", nc, 0, 64)?);
-        let gain_sign = match gain_sign.0 {
-            -1 => -1.0,
-            0 => 0.0,
-            1 => 1.0,
-            _ => return Err(PyValueError::new_err("gain_sign: expected -1, 0 or 1")),
-        };
+        let gain_sign = sign_of(gain_sign)?;
         let start = match start {
             "standard" => RlsStart::Standard,
             "exact" => RlsStart::Exact,
@@ -147,11 +178,17 @@ impl SelfTuner {
         let stuck_after =
             u16::try_from(count("stuck_after", stuck_after, 0, u16::MAX.into())?).unwrap_or(u16::MAX);
         let sensor = Sensor { range: lowest..=highest, stuck_after, ..Sensor::default() };
+        let supervision = Supervision {
+            fallback: fallback.map_or(Ok(Fallback::Hold), fallback_of)?,
+            excitation: excitation.unwrap_or(usual.supervision.excitation),
+            ..usual.supervision
+        };
         let settings = TunerSettings {
             input: input.unwrap_or(usual.input),
             gain_sign,
             probing,
             sensor,
+            supervision,
             ..usual.clone()
         };
         let tuner = Stepper::new(&orders, &settings, output_scale, input_scale, forgetting.0)
@@ -203,13 +240,58 @@ impl SelfTuner {
         self.tuner.set_adaptation(on);
     }
 
-    /// What it did in the latest sample: "probing", "controlling", "bridging" a silent sensor with the model, or "holding" the input.
+    /// Say that the plant's static gain has this sign from now on.
+    ///
+    /// Parameters
+    /// ----------
+    /// sign : {-1, 0, 1}
+    ///     0 if it is not known.
+    fn set_gain_sign(&mut self, py: Python<'_>, sign: Whole) -> PyResult<()> {
+        let sign = sign_of(sign)?;
+        self.tuner.set_gain_sign(sign).map_err(|error| failed(py, error))
+    }
+
+    /// Choose what acts while it is not trusted.
+    ///
+    /// Parameters
+    /// ----------
+    /// fallback : {"hold", "last good"} or float
+    fn set_fallback(&mut self, py: Python<'_>, fallback: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.tuner.set_fallback(fallback_of(fallback)?).map_err(|error| failed(py, error))
+    }
+
+    /// Trust it from now on: the controller acts, or the plant is excited until there is one.
+    fn trust(&mut self) {
+        self.tuner.trust();
+    }
+
+    /// Why it is not trusted, as "sign of the gain"; None if it is.
+    #[getter]
+    fn distrust(&self) -> Option<&'static str> {
+        self.tuner.distrust().map(thetahat_core::Distrust::word)
+    }
+
+    /// What the latest measurement told the model.
+    #[getter]
+    fn innovation(&self) -> Innovation {
+        self.tuner.innovation().into()
+    }
+
+    /// The samples since the latest design that was accepted.
+    #[getter]
+    fn design_age(&self) -> u32 {
+        self.tuner.design_age()
+    }
+
+    /// What it did in the latest sample: "probing", "controlling", "bridging" a silent sensor with the model, "holding" the
+    /// input, or "distrusted": the fallback acts, or a controller that is old.
     #[getter]
     fn state(&self) -> &'static str {
         match self.tuner.state() {
             TunerState::Probing => "probing",
             TunerState::Controlling => "controlling",
             TunerState::Bridging => "bridging",
+            TunerState::Distrusted(_) => "distrusted",
             _ => "holding",
         }
     }

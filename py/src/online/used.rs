@@ -124,14 +124,14 @@ impl Transition<f64, Dyn, Dyn> for UsedTransition<'_, '_> {
         }
     }
 
-    fn jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
+    fn next_jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
         match self {
-            Used::Linear(model) => model.jacobian(state, input),
+            Used::Linear(model) => model.next_jacobian(state, input),
             Used::Called(model) => model.derivative(state, input),
         }
     }
 
-    fn noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn process_noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
         match self {
             Used::Linear(model) => model.noise().clone(),
             Used::Called(model) => model.covariance(state, input),
@@ -147,14 +147,14 @@ impl Observation<f64, Dyn, Dyn, Dyn> for UsedObservation<'_, '_> {
         }
     }
 
-    fn jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
+    fn output_jacobian(&self, state: &DVector<f64>, input: &DVector<f64>) -> DMatrix<f64> {
         match self {
             Used::Linear(model) => model.output_matrix(),
             Used::Called(model) => model.derivative(state, input),
         }
     }
 
-    fn noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn measurement_noise(&self, state: &DVector<f64>, input: &DVector<f64>) -> Covariance<f64, Dyn> {
         match self {
             Used::Linear(model) => model.noise().clone(),
             Used::Called(model) => model.covariance(state, input),

@@ -57,6 +57,15 @@ impl Around<Dyn, Dyn> for Engine {
 ///     input, and of the next, then the constant.
 /// covariance : array_like, shape (n, n), optional
 ///     P to start from, in units of the noise variances.
+/// huber : float, default inf
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
+///     3 loses next to nothing where there are no outliers.
+/// gate : float, default inf
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
+///     deviations. Huber's bound or a gate, not both.
+/// release : int, default 0
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
+///     but for what the noise variance learns of them.
 ///
 /// Notes
 /// -----
@@ -119,12 +128,14 @@ impl RecursiveVectorArx {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl RecursiveVectorArx {
     #[new]
     #[pyo3(signature = (outputs, na, nb, nk = None, forgetting = STANDARD, *, constant = false, output_scales = None,
-        input_scales = None, start = "standard", blend = None, parameters = None, covariance = None))]
+        input_scales = None, start = "standard", blend = None, parameters = None, covariance = None,
+        huber = f64::INFINITY, gate = f64::INFINITY, release = Whole(0)))]
     #[pyo3(
-        text_signature = "(outputs, na, nb, nk=1, forgetting=0.99, *, constant=False, output_scales=None, input_scales=None, start='standard', blend=None, parameters=None, covariance=None)"
+        text_signature = "(outputs, na, nb, nk=1, forgetting=0.99, *, constant=False, output_scales=None, input_scales=None, start='standard', blend=None, parameters=None, covariance=None, huber=1e999, gate=1e999, release=0)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
@@ -141,6 +152,9 @@ impl RecursiveVectorArx {
         blend: Option<Whole>,
         parameters: Option<&Bound<'_, PyAny>>,
         covariance: Option<&Bound<'_, PyAny>>,
+        huber: f64,
+        gate: f64,
+        release: Whole,
     ) -> PyResult<Self> {
         let outputs = argument::size("outputs", outputs)?;
         let one = 1_u8.into_pyobject(py)?.into_any();
@@ -154,6 +168,7 @@ impl RecursiveVectorArx {
         }
         let of_inputs = scales(input_scales, inputs.len())?;
         let start = recursive::start(start, blend, parameters.is_some() || covariance.is_some())?;
+        let outliers = recursive::outliers(huber, gate, release)?;
         let parameters = match parameters {
             Some(given) => Some(array::finite_matrix("parameters", given, [Some(n), Some(outputs)])?),
             None => None,
@@ -161,7 +176,7 @@ impl RecursiveVectorArx {
         let covariance =
             covariance.map(|given| argument::covariance("covariance", given, Some(n))).transpose()?;
         let stepper = Stepper::new(&orders, &of_outputs, &of_inputs, forgetting.0)
-            .and_then(|stepper| stepper.with_start(start))
+            .and_then(|stepper| stepper.with_start(start)?.with_outliers(outliers))
             .and_then(|stepper| match parameters {
                 Some(parameters) => stepper.with_parameters(parameters),
                 None => Ok(stepper),
@@ -264,7 +279,7 @@ impl RecursiveVectorArx {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `log_row`; the message names the row, from 0. Nothing has changed then.
+    ///     As for `log_row`; the message names the row, from 1. Nothing has changed then.
     #[pyo3(signature = (y, *, u = None))]
     fn run(
         &mut self,
@@ -403,6 +418,12 @@ impl RecursiveVectorArx {
     #[getter]
     fn forgetting(&self) -> Forgetting {
         Forgetting { policy: self.estimator().forgetting() }
+    }
+
+    /// How many of the latest samples are outliers by the rule for them, since the last one that is not.
+    #[getter]
+    fn outliers_in_a_row(&self) -> u16 {
+        self.estimator().outliers_in_a_row()
     }
 
     /// Whether samples correct the estimate. Set it to turn that off and on; samples are taken in all the same.

@@ -70,6 +70,7 @@ impl WindowedLeastSquares {
 }
 
 #[pymethods]
+#[pyo3(crate = "crate::in_use")]
 impl WindowedLeastSquares {
     #[new]
     #[pyo3(signature = (n, blocks, block = Whole(1)), text_signature = "(n, blocks, block=1)")]
@@ -130,7 +131,7 @@ impl WindowedLeastSquares {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `update`; the message names the row, from 0. Nothing has changed then.
+    ///     As for `update`; the message names the row, from 1. Nothing has changed then.
     fn run(
         &mut self,
         py: Python<'_>,

@@ -17,8 +17,9 @@
 
 #define MOST 4096U
 
-/* All arguments of a step are addresses, four at the most: they stay in their registers. */
-typedef void step(const void *a, const void *b, const void *c, const void *d);
+/* All arguments of a step are addresses, four at the most: they stay in their registers, and so does what it returns, if it does: how many numbers
+   are missing. */
+typedef unsigned int step(const void *a, const void *b, const void *c, const void *d);
 
 /* The instructions of each sample. */
 static uint32_t samples[MOST];
@@ -47,14 +48,15 @@ static void start(void) {
 }
 
 /* Adds the cost of a call to the sample that is going on. */
-static void measure(step *work, const void *a, const void *b, const void *c, const void *d) {
+static unsigned int measure(step *work, const void *a, const void *b, const void *c, const void *d) {
     CURRENT = 0U;
     const uint32_t before = CURRENT;
-    work(a, b, c, d);
+    const unsigned int returned = work(a, b, c, d);
     const uint32_t ticks = ((before - CURRENT) & LARGEST) - nothing;
     if (count > 0U) {
         samples[count - 1U] += (ticks * 10U + 128U) / 256U;
     }
+    return returned;
 }
 
 static void next_sample(void) {
@@ -67,14 +69,14 @@ static void next_sample(void) {
 /* A function of the model that begins a sample, and one that goes on with it. */
 #define BEGINS(name)                                                                                                   \
     step __real_##name, __wrap_##name;                                                                                 \
-    void __wrap_##name(const void *a, const void *b, const void *c, const void *d) {                                   \
+    unsigned int __wrap_##name(const void *a, const void *b, const void *c, const void *d) {                           \
         next_sample();                                                                                                 \
-        measure(__real_##name, a, b, c, d);                                                                            \
+        return measure(__real_##name, a, b, c, d);                                                                     \
     }
 #define GOES_ON(name)                                                                                                  \
     step __real_##name, __wrap_##name;                                                                                 \
-    void __wrap_##name(const void *a, const void *b, const void *c, const void *d) {                                   \
-        measure(__real_##name, a, b, c, d);                                                                            \
+    unsigned int __wrap_##name(const void *a, const void *b, const void *c, const void *d) {                           \
+        return measure(__real_##name, a, b, c, d);                                                                     \
     }
 
 #if defined(PREDICTOR)

@@ -19,12 +19,7 @@ impl Scenario for Placed {
     type Output = f32;
 
     fn start(_: Case) -> Result<Self, Error> {
-        let wanted = WantedPoles {
-            response: &[1.0, -1.2, 0.4],
-            observer: &[1.0, -0.3],
-            integrator: true,
-            cancel_zeros: false,
-        };
+        let wanted = WantedPoles::new(&[1.0, -1.2, 0.4], &[1.0, -0.3]).with_integrator(true);
         RstController::pole_placement(&[1.0, -1.5, 0.7], &[0.0, 1.0, 0.5], &wanted)?
             .with_limits(-5.0..=5.0)
             .map(Placed)

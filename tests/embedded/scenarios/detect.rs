@@ -22,7 +22,7 @@ impl Scenario for Detector {
         let past = |lag| sample(case, k, lag);
         let predicted = 1.5 * past(1).y - 0.7 * past(2).y + past(1).u + 0.5 * past(2).u;
         let (error, variance) = (past(0).y - predicted, 0.0125);
-        Innovation { error, variance, nis: error * error / variance, action: Action::Frozen }
+        Innovation::new(error, variance, error * error / variance, Action::Frozen)
     }
 
     #[inline(never)]

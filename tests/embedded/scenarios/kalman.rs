@@ -97,12 +97,12 @@ impl Transition<f32, Const<3>, Const<1>> for Spring {
         Vector3::new(x.x + STEP * x.y, x.y + STEP * force, x.z)
     }
 
-    fn jacobian(&self, x: &Vector3<f32>, _: &Vector1<f32>) -> Matrix3<f32> {
+    fn next_jacobian(&self, x: &Vector3<f32>, _: &Vector1<f32>) -> Matrix3<f32> {
         let stiffness = x.z + 3.0 * HARDENING * x.x * x.x;
         Matrix3::new(1.0, STEP, 0.0, -STEP * stiffness, 1.0 - STEP * DAMPING, -STEP * x.x, 0.0, 0.0, 1.0)
     }
 
-    fn noise(&self, _: &Vector3<f32>, _: &Vector1<f32>) -> Covariance<f32, Const<3>> {
+    fn process_noise(&self, _: &Vector3<f32>, _: &Vector1<f32>) -> Covariance<f32, Const<3>> {
         self.process_noise.clone()
     }
 }
@@ -113,11 +113,11 @@ impl Observation<f32, Const<3>, Const<1>, Const<1>> for Spring {
         Vector1::new(x.x + 0.1 * x.x * x.x)
     }
 
-    fn jacobian(&self, x: &Vector3<f32>, _: &Vector1<f32>) -> RowVector3<f32> {
+    fn output_jacobian(&self, x: &Vector3<f32>, _: &Vector1<f32>) -> RowVector3<f32> {
         RowVector3::new(1.0 + 0.2 * x.x, 0.0, 0.0)
     }
 
-    fn noise(&self, _: &Vector3<f32>, _: &Vector1<f32>) -> Covariance<f32, Const<1>> {
+    fn measurement_noise(&self, _: &Vector3<f32>, _: &Vector1<f32>) -> Covariance<f32, Const<1>> {
         self.measurement_noise.clone()
     }
 }

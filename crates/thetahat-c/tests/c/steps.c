@@ -66,6 +66,8 @@ static void step_rls(void) {
     thetahat_rls *rls;
     learning.forgetting = THETAHAT_FORGETTING_EXPONENTIAL;
     learning.factor = (thetahat_number)0.96875;
+    learning.outliers = THETAHAT_OUTLIERS_HUBER;
+    learning.threshold = 1;
     done("rls", thetahat_rls_init(&rls, memory, sizeof memory, &thetahat_rls_4, scales, &learning));
     for (int k = 0; k < SAMPLES; k++) {
         thetahat_number regressor[4] = {-before(k, 1).y, -before(k, 2).y, before(k, 1).u, before(k, 2).u};
@@ -101,6 +103,7 @@ static void set_fit(const char *name, thetahat_arx *arx, size_t count) {
 static void step_arx(const char *name, const thetahat_arx_size *size, uint32_t nc, int warm) {
     static thetahat_word memory[THETAHAT_ARMAX_WORDS(5)], detector_memory[THETAHAT_DETECTOR_WORDS];
     thetahat_arx_model model = {0};
+    thetahat_learning learning = {0};
     thetahat_arx *arx;
     thetahat_detector *detector;
     model.na = 2;
@@ -111,7 +114,12 @@ static void step_arx(const char *name, const thetahat_arx_size *size, uint32_t n
     model.output_scale = 1;
     model.input_scales[0] = 1;
     model.noise_scale = (thetahat_number)0.125;
-    done(name, thetahat_arx_init(&arx, memory, sizeof memory, size, &model, NULL));
+    learning.forgetting = THETAHAT_FORGETTING_EXPONENTIAL;
+    learning.factor = (thetahat_number)0.99; /* as without it */
+    learning.outliers = THETAHAT_OUTLIERS_GATE;
+    learning.threshold = 2;
+    learning.release = 1;
+    done(name, thetahat_arx_init(&arx, memory, sizeof memory, size, &model, warm ? &learning : NULL));
     if (warm) {
         set_fit(name, arx, 4 + nc);
     }
@@ -152,6 +160,10 @@ static void step_kalman(void) {
     for (int k = 0; k < SAMPLES; k++) {
         thetahat_number measurement[2] = {record[k].y, before(k, 1).y}, state[2], covariance[4];
         thetahat_innovation innovation;
+        if (k == 5) {
+            done("kalman", thetahat_kalman_set_state(kalman, record[k].y > 0 ? measurement : zeros));
+            done("kalman", thetahat_kalman_widen(kalman, 4));
+        }
         done("kalman", thetahat_kalman_correct(kalman, &record[k].u, measurement, &innovation));
         done("kalman", thetahat_kalman_predict(kalman, &record[k].u));
         done("kalman", thetahat_kalman_state(kalman, state));

@@ -32,6 +32,14 @@ fn the_header_says_how_much_memory_each_size_needs() {
 }
 
 #[test]
+fn a_direct_term_is_taken_with_the_inputs_of_the_transition_or_refused() {
+    for precision in [Precision::Single, Precision::Double] {
+        let Some(printed) = run(precision, "inputs", &["crates/thetahat-c/tests/c/inputs.c"]) else { return };
+        assert_eq!(printed, " 0 0 0\n");
+    }
+}
+
+#[test]
 fn the_example_of_the_documentation_controls_its_heater() {
     for precision in [Precision::Single, Precision::Double] {
         run(precision, "heater", &["crates/thetahat-c/tests/c/heater.c"]);

@@ -76,13 +76,13 @@ struct Told<T> {
 }
 
 impl<T: Number> From<Innovation<T>> for Told<T> {
-    fn from(Innovation { error, variance, nis, action }: Innovation<T>) -> Self {
+    fn from(Innovation { error, variance, nis, action, .. }: Innovation<T>) -> Self {
         Told { numbers: vec![error, variance, nis], action }
     }
 }
 
 impl<T: Number, const M: usize> From<Innovation<T, SVector<T, M>>> for Told<T> {
-    fn from(Innovation { error, variance, nis, action }: Innovation<T, SVector<T, M>>) -> Self {
+    fn from(Innovation { error, variance, nis, action, .. }: Innovation<T, SVector<T, M>>) -> Self {
         Told { numbers: error.iter().chain(&variance).copied().chain([nis]).collect(), action }
     }
 }
@@ -94,12 +94,19 @@ pub(crate) fn lines<T: Number>() -> Result<String, Error> {
     step_arx(&mut lines, "arx", Ok)?;
     step_arx(&mut lines, "arx_warm", |arx| {
         let (parameters, covariance, variance) = fit()?;
-        arx.with_parameters(parameters)?.with_covariance(covariance)?.with_noise_variance(variance, 50)
+        arx.with_parameters(parameters)?
+            .with_covariance(covariance)?
+            .with_noise_variance(variance, 50)?
+            .with_outliers(Outliers::Gate { nis: T::from(2.0), release: 1 })
     })?;
     step_armax(&mut lines, "armax", Ok)?;
     step_armax(&mut lines, "armax_warm", |armax| {
         let (parameters, covariance, variance) = fit()?;
-        armax.with_parameters(parameters)?.with_covariance(covariance)?.with_noise_variance(variance, 50)
+        armax
+            .with_parameters(parameters)?
+            .with_covariance(covariance)?
+            .with_noise_variance(variance, 50)?
+            .with_outliers(Outliers::Gate { nis: T::from(2.0), release: 1 })
     })?;
     step_kalman(&mut lines)?;
     step_ekf(&mut lines)?;
@@ -113,7 +120,8 @@ pub(crate) fn lines<T: Number>() -> Result<String, Error> {
 fn step_rls<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
     let forgetting = Forgetting::Exponential { factor: T::from(0.96875) };
     let mut rls: RecursiveLeastSquares<T, Const<4>> =
-        RecursiveLeastSquares::new(&Vector4::repeat(T::one()), forgetting)?;
+        RecursiveLeastSquares::new(&Vector4::repeat(T::one()), forgetting)?
+            .with_outliers(Outliers::Huber { threshold: T::one() })?;
     for k in 0..SAMPLES {
         let [(u1, y1), (u2, y2)] = [1, 2].map(|lag| lines.before(k, lag));
         let innovation = rls.update(&Vector4::new(-y1, -y2, u1, u2), lines.record[k].1)?;
@@ -222,6 +230,10 @@ fn step_kalman<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
     for k in 0..SAMPLES {
         let (u, y) = lines.record[k];
         let measurement = Vector2::new(y, lines.before(k, 1).1);
+        if k == 5 {
+            kalman.set_state(if y > T::zero() { measurement } else { Vector2::repeat(T::zero()) })?;
+            kalman.widen(T::from(4.0))?;
+        }
         let innovation = kalman.correct(&observation, &Vector1::new(u), &measurement)?;
         kalman.predict(&transition, &Vector1::new(u))?;
         let covariance = kalman.covariance().matrix();
@@ -243,12 +255,12 @@ impl<T: Number> Transition<T, Const<2>, Const<1>> for Spring<T> {
         Vector2::new(x.x + x.y / eight, x.y + (u.x - x.y - x.x - x.x * x.x * x.x) / eight)
     }
 
-    fn jacobian(&self, x: &Vector2<T>, _: &Vector1<T>) -> Matrix2<T> {
+    fn next_jacobian(&self, x: &Vector2<T>, _: &Vector1<T>) -> Matrix2<T> {
         let stiffness = T::one() + T::from(3.0) * x.x * x.x;
         Matrix2::new(T::one(), T::from(0.125), -stiffness / T::from(8.0), T::from(0.875))
     }
 
-    fn noise(&self, _: &Vector2<T>, _: &Vector1<T>) -> Covariance<T, Const<2>> {
+    fn process_noise(&self, _: &Vector2<T>, _: &Vector1<T>) -> Covariance<T, Const<2>> {
         self.process_noise.clone()
     }
 }
@@ -258,11 +270,11 @@ impl<T: Number> Observation<T, Const<2>, Const<1>, Const<1>> for Spring<T> {
         Vector1::new(x.x + x.x * x.x / T::from(8.0))
     }
 
-    fn jacobian(&self, x: &Vector2<T>, _: &Vector1<T>) -> SMatrix<T, 1, 2> {
+    fn output_jacobian(&self, x: &Vector2<T>, _: &Vector1<T>) -> SMatrix<T, 1, 2> {
         SMatrix::<T, 1, 2>::new(T::one() + x.x / T::from(4.0), T::zero())
     }
 
-    fn noise(&self, _: &Vector2<T>, _: &Vector1<T>) -> Covariance<T, Const<1>> {
+    fn measurement_noise(&self, _: &Vector2<T>, _: &Vector1<T>) -> Covariance<T, Const<1>> {
         self.noise.clone()
     }
 }
@@ -308,8 +320,7 @@ fn step_rst<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
         [[1.0, -0.75], [0.0, 0.5]].map(|p| p.map(T::from)),
         [[1.0, -0.5], [1.0, -0.25]].map(|p| p.map(T::from)),
     );
-    let wanted =
-        WantedPoles { response: &response, observer: &observer, integrator: true, cancel_zeros: false };
+    let wanted = WantedPoles::new(&response, &observer).with_integrator(true);
     let rst: RstController<T, Const<2>> = RstController::pole_placement(&a, &b, &wanted)?;
     let mut rst = rst.with_limits(-T::one()..=T::one())?;
     rst.start(T::from(0.5), lines.record[0].1, lines.record[0].0);

@@ -20,13 +20,13 @@ impl<T: Real> ParametricTransition<T, Const<2>, Const<1>, Const<1>> for Cart<T> 
     fn next(&self, x: &Vector2<T>, inverse_mass: &One<T>, force: &One<T>) -> Vector2<T> {
         Vector2::new(x[0] + self.sample_time * x[1], x[1] + self.sample_time * inverse_mass[0] * force[0])
     }
-    fn state_jacobian(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Matrix2<T> {
+    fn next_jacobian(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Matrix2<T> {
         Matrix2::new(T::one(), self.sample_time, T::zero(), T::one())
     }
-    fn parameter_jacobian(&self, _: &Vector2<T>, _: &One<T>, force: &One<T>) -> Vector2<T> {
+    fn next_parameter_jacobian(&self, _: &Vector2<T>, _: &One<T>, force: &One<T>) -> Vector2<T> {
         Vector2::new(T::zero(), self.sample_time * force[0])
     }
-    fn noise(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Covariance<T, Const<2>> {
+    fn process_noise(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Covariance<T, Const<2>> {
         Covariance::from_diagonal(&Vector2::new(T::zero(), self.noise)).unwrap()
     }
 }
@@ -35,13 +35,13 @@ impl<T: Real> ParametricObservation<T, Const<2>, Const<1>, Const<2>, Const<1>> f
     fn output(&self, x: &Vector2<T>, inverse_mass: &One<T>, force: &One<T>) -> Vector2<T> {
         Vector2::new(inverse_mass[0] * force[0], x[0])
     }
-    fn state_jacobian(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Matrix2<T> {
+    fn output_jacobian(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Matrix2<T> {
         Matrix2::new(T::zero(), T::zero(), T::one(), T::zero())
     }
-    fn parameter_jacobian(&self, _: &Vector2<T>, _: &One<T>, force: &One<T>) -> Vector2<T> {
+    fn output_parameter_jacobian(&self, _: &Vector2<T>, _: &One<T>, force: &One<T>) -> Vector2<T> {
         Vector2::new(force[0], T::zero())
     }
-    fn noise(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Covariance<T, Const<2>> {
+    fn measurement_noise(&self, _: &Vector2<T>, _: &One<T>, _: &One<T>) -> Covariance<T, Const<2>> {
         Covariance::from_diagonal(&Vector2::new(nalgebra::convert(0.1), nalgebra::convert(1e-4))).unwrap()
     }
 }
@@ -61,15 +61,15 @@ fn the_larger_model_is_made_of_the_parts() {
     let transition: &dyn Transition<f64, Const<3>, Const<1>> = &plant;
     assert_eq!(transition.next(&z, &force), Vector3::new(1.2, 2.2, 0.5));
     let f = Matrix3::new(1.0, 0.1, 0.0, 0.0, 1.0, 0.4, 0.0, 0.0, 1.0);
-    assert_eq!(transition.jacobian(&z, &force), f);
+    assert_eq!(transition.next_jacobian(&z, &force), f);
     let q = Matrix3::from_diagonal(&Vector3::new(0.0, 0.5, 0.25));
-    assert_eq!(transition.noise(&z, &force).matrix(), q);
+    assert_eq!(transition.process_noise(&z, &force).matrix(), q);
 
     let observation: &dyn Observation<f64, Const<3>, Const<2>, Const<1>> = &plant;
     assert_eq!(observation.output(&z, &force), Vector2::new(2.0, 1.0));
     let h = SMatrix::<f64, 2, 3>::new(0.0, 0.0, 4.0, 1.0, 0.0, 0.0);
-    assert_eq!(observation.jacobian(&z, &force), h);
-    assert_eq!(observation.noise(&z, &force).variances(), Vector2::new(0.1, 1e-4));
+    assert_eq!(observation.output_jacobian(&z, &force), h);
+    assert_eq!(observation.measurement_noise(&z, &force).variances(), Vector2::new(0.1, 1e-4));
     assert_eq!(plant.model().sample_time, 0.1);
 }
 
@@ -80,10 +80,10 @@ fn noises_with_correlations_stay_side_by_side() {
         fn next(&self, x: &Vector2<f64>, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Vector2<f64> {
             *x
         }
-        fn state_jacobian(&self, _: &Vector2<f64>, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Matrix2<f64> {
+        fn next_jacobian(&self, _: &Vector2<f64>, _: &Vector2<f64>, _: &SVector<f64, 0>) -> Matrix2<f64> {
             Matrix2::identity()
         }
-        fn parameter_jacobian(
+        fn next_parameter_jacobian(
             &self,
             _: &Vector2<f64>,
             _: &Vector2<f64>,
@@ -91,7 +91,7 @@ fn noises_with_correlations_stay_side_by_side() {
         ) -> Matrix2<f64> {
             Matrix2::zeros()
         }
-        fn noise(
+        fn process_noise(
             &self,
             _: &Vector2<f64>,
             _: &Vector2<f64>,
@@ -105,7 +105,7 @@ fn noises_with_correlations_stay_side_by_side() {
         .unwrap()
         .with_walk(Covariance::new(&walk).unwrap())
         .unwrap();
-    let found = Transition::noise(&model, &SVector::zeros(), &SVector::zeros()).matrix();
+    let found = model.process_noise(&SVector::zeros(), &SVector::zeros()).matrix();
     let mut expected = SMatrix::<f64, 4, 4>::zeros();
     expected.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::new(4.0, 1.0, 1.0, 2.0));
     expected.fixed_view_mut::<2, 2>(2, 2).copy_from(&walk);
@@ -120,8 +120,8 @@ fn an_observation_without_parameters_is_a_parametric_one() {
         Augmented::new(WithoutParameters(sensor), Const::<2>, Const::<1>).unwrap();
     let z = Vector3::new(1.0, 2.0, 100.0);
     assert_eq!(sensor.output(&z, &SVector::zeros()), Vector1::new(7.0));
-    assert_eq!(sensor.jacobian(&z, &SVector::zeros()), Matrix1x3::new(1.0, 3.0, 0.0));
-    assert_eq!(Observation::noise(&sensor, &z, &SVector::zeros()), noise);
+    assert_eq!(sensor.output_jacobian(&z, &SVector::zeros()), Matrix1x3::new(1.0, 3.0, 0.0));
+    assert_eq!(sensor.measurement_noise(&z, &SVector::zeros()), noise);
 }
 
 /// Estimates the mass of a cart that is pushed to and fro, from its position alone.
@@ -201,13 +201,23 @@ mod dynamic {
         fn next(&self, _: &DVector<f64>, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
             DVector::from_element(self.states, 1.0)
         }
-        fn state_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        fn next_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
             DMatrix::from_element(self.states, self.states, 2.0)
         }
-        fn parameter_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        fn next_parameter_jacobian(
+            &self,
+            _: &DVector<f64>,
+            _: &DVector<f64>,
+            _: &DVector<f64>,
+        ) -> DMatrix<f64> {
             DMatrix::from_element(self.states, self.parameters, 3.0)
         }
-        fn noise(&self, _: &DVector<f64>, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        fn process_noise(
+            &self,
+            _: &DVector<f64>,
+            _: &DVector<f64>,
+            _: &DVector<f64>,
+        ) -> Covariance<f64, Dyn> {
             Covariance::from_diagonal(&DVector::from_element(self.states, 4.0)).unwrap()
         }
     }
@@ -222,8 +232,8 @@ mod dynamic {
         let (z, none) = (DVector::from_element(3, 7.0), DVector::zeros(0));
         assert_eq!(model.next(&z, &none).as_slice(), [1.0, 1.0, 7.0]);
         let f = [2.0, 2.0, 0.0, 2.0, 2.0, 0.0, 3.0, 3.0, 1.0];
-        assert_eq!(model.jacobian(&z, &none).as_slice(), f);
-        assert_eq!(model.noise(&z, &none).variances().as_slice(), [4.0, 4.0, 5.0]);
+        assert_eq!(model.next_jacobian(&z, &none).as_slice(), f);
+        assert_eq!(model.process_noise(&z, &none).variances().as_slice(), [4.0, 4.0, 5.0]);
 
         let walk = Covariance::from_diagonal(&DVector::from_element(2, 5.0)).unwrap();
         let error = Error::Length { argument: "walk", expected: 1, found: 2 };

@@ -5,6 +5,19 @@ use crate::error::check_length;
 use crate::{Error, Real};
 
 /// How the weight of a local model depends on where a point lies.
+///
+/// ```
+/// use thetahat_core::{Basis, Local, Membership};
+///
+/// // Two constants, left and right of 0: how far one goes over into the other.
+/// let (sides, domain) = ([[-1.0, 0.0], [0.0, 1.0]], [[-1.0, 1.0]]);
+/// let at = |membership| {
+///     let basis = Local { membership, planes: false, sides: &sides, domain: &domain };
+///     basis.value(&[0.0, 1.0], &[0.125])
+/// };
+/// assert_eq!((at(Membership::Rectangle), at(Membership::Trapezoid)), (1.0, 0.75));
+/// assert!(at(Membership::Gaussian) > 0.5 && at(Membership::Gaussian) < 1.0);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Membership {
     /// 1 in its box, 0 outside.

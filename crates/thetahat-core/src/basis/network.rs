@@ -5,6 +5,14 @@ use crate::error::check_length;
 use crate::{Error, Real};
 
 /// What a unit of a [`Network`] makes of its sum.
+///
+/// ```
+/// use thetahat_core::Activation;
+///
+/// // The value and the slope.
+/// assert_eq!(Activation::Relu.at(2.0), (2.0, 1.0));
+/// assert_eq!(Activation::Logistic.at(0.0), (0.5, 0.25));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
     /// tanh a.

@@ -9,6 +9,7 @@ mod probe;
 mod response;
 mod sensor;
 mod settings;
+mod trust;
 
 pub use direct::{DirectOrders, DirectSelfTuner};
 pub use indirect::IndirectSelfTuner;
@@ -17,6 +18,7 @@ pub use probe::Probing;
 pub use response::ResponseWanted;
 pub use sensor::Sensor;
 pub use settings::{TunerSettings, TunerState};
+pub use trust::{Distrust, Fallback, Supervision};
 
 #[cfg(test)]
 mod tests;

@@ -23,6 +23,19 @@ use crate::{Covariance, Dimension, Error, GainSchedule, LinearObservation, Linea
 ///
 /// Source: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, sections 2.4 and 5.4; Åström and Wittenmark,
 /// Computer-Controlled Systems, 3rd ed. 1997, section 11.2.
+///
+/// ```
+/// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
+/// use thetahat_core::{Covariance, Error, LinearQuadratic};
+///
+/// // x(k+1) = x + u with weights 1 and 1: P = 1 + P/(P + 1), the golden ratio.
+/// let one: Covariance<f64, Const<1>> = Covariance::from_diagonal(&Vector1::new(1.0))?;
+/// let found = LinearQuadratic::solve(&Matrix1::new(1.0), &Matrix1::new(1.0), one.clone(), one, 100)?;
+/// let golden = (1.0 + 5f64.sqrt()) / 2.0;
+/// assert!((found.cost.variances()[0] - golden).abs() < 1e-12);
+/// assert!((found.gain[0] - 1.0 / golden).abs() < 1e-12);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LinearQuadratic<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<N>> {

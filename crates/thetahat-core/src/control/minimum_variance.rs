@@ -41,7 +41,20 @@ impl MinimumVarianceOrders {
 }
 
 /// What is kept small beside the error.
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{Error, MinimumVariance, RstController};
+///
+/// // A price on changes of the input, and no error from a constant load.
+/// let wanted = MinimumVariance::new(0.1).with_integrator(true);
+/// let paper: RstController<f32, Const<2>> =
+///     RstController::minimum_variance(&[1.0, -0.9], &[0.0, 1.0], &[1.0, -0.3], &wanted)?;
+/// assert!((1.0 + paper.r().sum()).abs() < 1e-6); // R has the factor 1 - q⁻¹
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct MinimumVariance<T> {
     /// ρ, what u² costs beside (y - u_c)²; with an integrator what the square of a change of u costs. 0 is the minimum
     /// variance of the output, at whatever price, and needs a plant whose inverse is stable.
@@ -49,6 +62,21 @@ pub struct MinimumVariance<T> {
     /// Whether the noise drifts, C/(1 - q⁻¹) e in place of C e: then the controller integrates, and a constant load leaves
     /// no error.
     pub integrator: bool,
+}
+
+impl<T> MinimumVariance<T> {
+    /// With this weight of the input, and without an integrator.
+    pub const fn new(input_weight: T) -> Self {
+        MinimumVariance { input_weight, integrator: false }
+    }
+}
+
+impl<T: Copy> MinimumVariance<T> {
+    /// The same with an integrator, or without.
+    pub const fn with_integrator(mut self, integrator: bool) -> Self {
+        self.integrator = integrator;
+        self
+    }
 }
 
 impl<T: Real, N: Dimension> RstController<T, N> {
@@ -82,7 +110,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// use thetahat_core::{Error, MinimumVariance, RstController};
     ///
     /// // y(k) = 0.9 y(k-1) + u(k-1) + e(k) - 0.3 e(k-1): u = -0.6 y.
-    /// let wanted = MinimumVariance { input_weight: 0.0, integrator: false };
+    /// let wanted = MinimumVariance::new(0.0);
     /// let paper: RstController<f64, Const<1>> =
     ///     RstController::minimum_variance(&[1.0, -0.9], &[0.0, 1.0], &[1.0, -0.3], &wanted)?;
     /// assert!((paper.s()[0] - 0.6).abs() < 1e-15 && paper.r()[0] == 0.0);

@@ -27,13 +27,14 @@ use crate::{Error, Real};
 /// ```
 /// use thetahat_core::{Error, PidSettings};
 ///
-/// let settings = PidSettings { integral_time: 10.0, derivative_time: 1.0, ..PidSettings::proportional(2.0, 0.5) };
+/// let settings = PidSettings::proportional(2.0, 0.5).with_integral_time(10.0).with_derivative_time(1.0);
 /// let mut oven = settings.controller()?.with_limits(0.0..=100.0)?;
 /// let power = oven.control(180.0, 20.0);
 /// assert_eq!(power, 100.0);
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PidSettings<T> {
     /// K, the unit of u over that of y.
     pub gain: T,
@@ -60,6 +61,30 @@ impl<T: Real> PidSettings<T> {
             set_point_weight: T::one(),
             sample_time,
         }
+    }
+
+    /// The same with an integral of this T_i.
+    pub fn with_integral_time(mut self, time: T) -> Self {
+        self.integral_time = time;
+        self
+    }
+
+    /// The same with a derivative of this T_d.
+    pub fn with_derivative_time(mut self, time: T) -> Self {
+        self.derivative_time = time;
+        self
+    }
+
+    /// The same with this filter of the derivative, N_d.
+    pub fn with_derivative_filter(mut self, number: T) -> Self {
+        self.derivative_filter = number;
+        self
+    }
+
+    /// The same with this weight of the set point, β.
+    pub fn with_set_point_weight(mut self, weight: T) -> Self {
+        self.set_point_weight = weight;
+        self
     }
 
     /// The controller, at rest.

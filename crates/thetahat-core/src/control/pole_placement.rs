@@ -31,7 +31,19 @@ impl PlacementOrders {
 }
 
 /// Where the poles of the closed loop shall be. Polynomials begin with their 1.
+///
+/// ```
+/// use thetahat_core::nalgebra::Const;
+/// use thetahat_core::{Error, RstController, WantedPoles};
+///
+/// // The loop of y(k) = 0.9 y(k-1) + 0.1 u(k-1) shall have its pole at 0.5: R = 1, S = 4.
+/// let wanted = WantedPoles::new(&[1.0, -0.5], &[1.0]);
+/// let heater: RstController<f64, Const<1>> = RstController::pole_placement(&[1.0, -0.9], &[0.0, 0.1], &wanted)?;
+/// assert!((heater.s()[0] - 4.0).abs() < 1e-12);
+/// # Ok::<(), Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct WantedPoles<'a, T> {
     /// A_m: how the output answers the set point.
     pub response: &'a [T],
@@ -41,6 +53,25 @@ pub struct WantedPoles<'a, T> {
     pub integrator: bool,
     /// Whether the zeros of B are cancelled: then the response has none, but those in B⁺ show in the input.
     pub cancel_zeros: bool,
+}
+
+impl<'a, T> WantedPoles<'a, T> {
+    /// A_m and A_o, without an integrator and with the zeros of B.
+    pub const fn new(response: &'a [T], observer: &'a [T]) -> Self {
+        WantedPoles { response, observer, integrator: false, cancel_zeros: false }
+    }
+
+    /// The same with an integrator, or without.
+    pub const fn with_integrator(mut self, integrator: bool) -> Self {
+        self.integrator = integrator;
+        self
+    }
+
+    /// The same with the zeros of B cancelled, or not.
+    pub const fn with_cancelled_zeros(mut self, cancel_zeros: bool) -> Self {
+        self.cancel_zeros = cancel_zeros;
+        self
+    }
 }
 
 impl<T: Real, N: Dimension> RstController<T, N> {
@@ -71,8 +102,7 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     ///
     /// // A motor, 1/(s (s + 1)) every 0.5 s; poles of frequency 1 and damping 0.7.
     /// let (a, b) = ([1.0, -1.606531, 0.606531], [0.0, 0.106531, 0.090204]);
-    /// let wanted =
-    ///     WantedPoles { response: &[1.0, -1.320535, 0.496585], observer: &[1.0], integrator: false, cancel_zeros: false };
+    /// let wanted = WantedPoles::new(&[1.0, -1.320535, 0.496585], &[1.0]);
     /// const SIZE: usize = PlacementOrders { na: 2, nb: 2, integrator: false }.size();
     /// let motor: RstController<f64, Const<SIZE>> = RstController::pole_placement(&a, &b, &wanted)?;
     /// assert!((motor.r()[0] - 0.111).abs() < 1e-3 && (motor.s()[0] - 1.642).abs() < 1e-3);

@@ -95,12 +95,20 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     ///
     /// Errors: [`Error::OutOfRange`] if they are NaN, or the lower one is above the upper one.
     pub fn with_limits(mut self, limits: RangeInclusive<T>) -> Result<Self, Error> {
+        self.set_limits(limits)?;
+        Ok(self)
+    }
+
+    /// Sets the limits of the input: the next [`control`](RstController::control) keeps them.
+    ///
+    /// Errors, after which nothing has changed: those of [`with_limits`](RstController::with_limits).
+    pub fn set_limits(&mut self, limits: RangeInclusive<T>) -> Result<(), Error> {
         // Not so with a NaN either.
         if limits.is_empty() {
             return Err(Error::OutOfRange { argument: "limits", range: "in order, the lower one first" });
         }
         (self.lowest, self.highest) = (*limits.start(), *limits.end());
-        Ok(self)
+        Ok(())
     }
 
     /// Takes over from a hand: if the measurement and the set point stay as they are, the input stays at this one first, and then

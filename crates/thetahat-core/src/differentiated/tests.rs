@@ -65,24 +65,24 @@ fn jacobians_are_those_of_differences() {
         let next = |x: &SVector<f64, 4>, w: &Vector2<f64>| {
             SVector::<f64, 4>::from(vehicle.next((*x).into(), u.into(), (*w).into()))
         };
-        let found = Transition::jacobian(&motion, &x, &u);
+        let found = motion.next_jacobian(&x, &u);
         assert!((found - quotient(|x| next(x, &Vector2::zeros()), &x)).amax() < 1e-7);
         assert_eq!(motion.next(&x, &u), next(&x, &Vector2::zeros()));
         let gamma = quotient(|w| next(&x, w), &Vector2::zeros());
-        let found = Transition::noise(&motion, &x, &u).matrix();
+        let found = motion.process_noise(&x, &u).matrix();
         assert!((found - gamma * q * gamma.transpose()).amax() < 1e-7);
 
         let output = |x: &SVector<f64, 4>, v: &SVector<f64, 3>| {
             Vector2::from(ObservationFunction::output(&vehicle, (*x).into(), u.into(), (*v).into()))
         };
-        let found = Observation::jacobian(&sensor, &x, &u);
+        let found = sensor.output_jacobian(&x, &u);
         let scale = 1.0 / x.fixed_rows::<2>(0).norm().min(1.0);
         assert!(
             (found - quotient(|x| output(x, &SVector::zeros()), &x)).amax() < 1e-6 * scale * scale * scale
         );
         assert_eq!(Observation::output(&sensor, &x, &u), output(&x, &SVector::zeros()));
         let v = quotient(|v| output(&x, v), &SVector::zeros());
-        let found = Observation::noise(&sensor, &x, &u).matrix();
+        let found = sensor.measurement_noise(&x, &u).matrix();
         assert!((found - v * r * v.transpose()).amax() < 1e-6);
     }
 }

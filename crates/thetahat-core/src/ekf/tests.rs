@@ -34,10 +34,10 @@ impl Transition<f64, Const<2>> for Point {
     fn next(&self, x: &Vector2<f64>, _: &None) -> Vector2<f64> {
         if self.0 == Fault::Value { x / 0.0 } else { *x }
     }
-    fn jacobian(&self, _: &Vector2<f64>, _: &None) -> Matrix2<f64> {
+    fn next_jacobian(&self, _: &Vector2<f64>, _: &None) -> Matrix2<f64> {
         if self.0 == Fault::Jacobian { Matrix2::from_element(f64::NAN) } else { Matrix2::identity() }
     }
-    fn noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<2>> {
+    fn process_noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<2>> {
         unit(self.0)
     }
 }
@@ -52,14 +52,14 @@ impl Observation<f64, Const<2>, Const<1>> for Range {
     fn output(&self, x: &Vector2<f64>, _: &None) -> Vector1<f64> {
         Vector1::new(if self.fault == Fault::Value { f64::NAN } else { x.norm() })
     }
-    fn jacobian(&self, x: &Vector2<f64>, _: &None) -> RowVector2<f64> {
+    fn output_jacobian(&self, x: &Vector2<f64>, _: &None) -> RowVector2<f64> {
         if self.fault == Fault::Jacobian {
             RowVector2::new(f64::INFINITY, 0.0)
         } else {
             x.transpose() / x.norm()
         }
     }
-    fn noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<1>> {
+    fn measurement_noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<1>> {
         match self.fault {
             Fault::Noise => Covariance::unknown(Const),
             _ => Covariance::from_diagonal(&Vector1::new(self.variance)).unwrap(),
@@ -237,10 +237,10 @@ fn a_point_is_found_from_two_ranges() {
         fn output(&self, x: &Vector2<f64>, _: &None) -> Vector2<f64> {
             Vector2::new((x - BASE[0]).norm(), (x - BASE[1]).norm())
         }
-        fn jacobian(&self, x: &Vector2<f64>, _: &None) -> Matrix2<f64> {
+        fn output_jacobian(&self, x: &Vector2<f64>, _: &None) -> Matrix2<f64> {
             Matrix2::from_rows(&BASE.map(|base| (x - base).transpose() / (x - base).norm()))
         }
-        fn noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<2>> {
+        fn measurement_noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<2>> {
             Covariance::new(&Matrix2::new(0.01, 0.005, 0.005, 0.01)).unwrap()
         }
     }
@@ -281,10 +281,10 @@ mod dynamic {
         fn next(&self, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
             DVector::zeros(self.value)
         }
-        fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        fn next_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
             DMatrix::identity(self.rows, self.columns)
         }
-        fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        fn process_noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
             unit(self.noise)
         }
     }
@@ -293,10 +293,10 @@ mod dynamic {
         fn output(&self, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
             DVector::zeros(self.value)
         }
-        fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        fn output_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
             DMatrix::identity(self.rows, self.columns)
         }
-        fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        fn measurement_noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
             unit(self.noise)
         }
     }

@@ -1,6 +1,14 @@
 //! The orders of ARX models: how many past outputs and inputs make the next output.
 
 /// The orders of one input of an ARX model.
+///
+/// ```
+/// use thetahat_core::{ArxOrders, InputOrders};
+///
+/// // b_0 u(k-3) + b_1 u(k-4): two coefficients after a dead time of three samples.
+/// const VALVE: InputOrders = InputOrders { nb: 2, nk: 3 };
+/// assert_eq!(ArxOrders { na: 0, inputs: &[VALVE], constant: false }.delays(), 3);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputOrders {
     /// The number of coefficients. With 0 the input is read, and not used.
@@ -79,4 +87,23 @@ impl ArxOrders<'_> {
         }
         sum
     }
+}
+
+/// Orders that are a constant of a type: what is made of them does not compile with a wrong size.
+///
+/// `O` is [`ArxOrders`] or [`ArmaxOrders`](crate::ArmaxOrders). See [`RecursiveArx::of`](crate::RecursiveArx::of).
+///
+/// ```
+/// use thetahat_core::{ArxOrders, ConstantOrders, InputOrders};
+///
+/// struct Heater;
+/// impl ConstantOrders for Heater {
+///     const ORDERS: ArxOrders<'static> =
+///         ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
+/// }
+/// assert_eq!(Heater::ORDERS.parameters(), 2);
+/// ```
+pub trait ConstantOrders<O = ArxOrders<'static>> {
+    /// The orders.
+    const ORDERS: O;
 }

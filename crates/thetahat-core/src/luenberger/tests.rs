@@ -221,10 +221,10 @@ impl Transition<f64, Const<2>, Const<1>> for Pendulum {
     fn next(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Vector2<f64> {
         Vector2::new(x[0] + 0.02 * x[1], x[1] + 0.02 * (u[0] - 9.81 * x[0].sin()))
     }
-    fn jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
+    fn next_jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
         Matrix2::new(1.0, 0.02, -0.02 * 9.81 * x[0].cos(), 1.0)
     }
-    fn noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
+    fn process_noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
         Covariance::zero(Const)
     }
 }
@@ -233,10 +233,10 @@ impl Observation<f64, Const<2>, Const<1>, Const<1>> for Pendulum {
     fn output(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Vector1<f64> {
         Vector1::new((x[0] / 2.0).sin())
     }
-    fn jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> RowVector2<f64> {
+    fn output_jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> RowVector2<f64> {
         RowVector2::new((x[0] / 2.0).cos() / 2.0, 0.0)
     }
-    fn noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<1>> {
+    fn measurement_noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<1>> {
         Covariance::zero(Const)
     }
 }
@@ -282,10 +282,10 @@ fn errors_name_the_argument_and_change_nothing() {
         fn next(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
             Vector1::new(self.0)
         }
-        fn jacobian(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
+        fn next_jacobian(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
             Vector1::new(self.0)
         }
-        fn noise(&self, _: &Vector1<f64>, _: &None) -> Covariance<f64, Const<1>> {
+        fn process_noise(&self, _: &Vector1<f64>, _: &None) -> Covariance<f64, Const<1>> {
             Covariance::zero(Const)
         }
     }
@@ -293,10 +293,10 @@ fn errors_name_the_argument_and_change_nothing() {
         fn output(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
             Vector1::new(self.0)
         }
-        fn jacobian(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
+        fn output_jacobian(&self, _: &Vector1<f64>, _: &None) -> Vector1<f64> {
             Vector1::new(self.0)
         }
-        fn noise(&self, _: &Vector1<f64>, _: &None) -> Covariance<f64, Const<1>> {
+        fn measurement_noise(&self, _: &Vector1<f64>, _: &None) -> Covariance<f64, Const<1>> {
             Covariance::zero(Const)
         }
     }

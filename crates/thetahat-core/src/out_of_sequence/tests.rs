@@ -32,11 +32,11 @@ impl Transition<f64, Const<2>, Const<1>> for Bent {
         Vector2::new(x.x + 0.1 * x.y, x.y - 0.1 * x.x.powi(3) + u.x)
     }
 
-    fn jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
+    fn next_jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> Matrix2<f64> {
         Matrix2::new(1.0, 0.1, -0.3 * x.x * x.x, 1.0)
     }
 
-    fn noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
+    fn process_noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
         Covariance::from_diagonal(&Vector2::new(0.01, 0.02)).unwrap()
     }
 }
@@ -46,11 +46,11 @@ impl Observation<f64, Const<2>, Const<2>, Const<1>> for Bent {
         Vector2::new(x.x + 0.1 * x.x * x.x, x.y + 0.1 * u.x)
     }
 
-    fn jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> SMatrix<f64, 2, 2> {
+    fn output_jacobian(&self, x: &Vector2<f64>, _: &Vector1<f64>) -> SMatrix<f64, 2, 2> {
         Matrix2::new(1.0 + 0.2 * x.x, 0.0, 0.0, 1.0)
     }
 
-    fn noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
+    fn measurement_noise(&self, _: &Vector2<f64>, _: &Vector1<f64>) -> Covariance<f64, Const<2>> {
         Covariance::from_diagonal(&Vector2::new(0.1, 0.1)).unwrap()
     }
 }
@@ -171,12 +171,12 @@ impl Transition<f64, Const<2>, Const<1>> for Failing {
         if x.y > 50.0 { Vector2::repeat(f64::NAN) } else { self.0.next(x, u) }
     }
 
-    fn jacobian(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Matrix2<f64> {
-        self.0.jacobian(x, u)
+    fn next_jacobian(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Matrix2<f64> {
+        self.0.next_jacobian(x, u)
     }
 
-    fn noise(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Covariance<f64, Const<2>> {
-        Transition::noise(&self.0, x, u)
+    fn process_noise(&self, x: &Vector2<f64>, u: &Vector1<f64>) -> Covariance<f64, Const<2>> {
+        self.0.process_noise(x, u)
     }
 }
 

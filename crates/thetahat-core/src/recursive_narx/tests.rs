@@ -167,6 +167,7 @@ fn what_overflows_leaves_again() {
         actions.push(plant.log_row(if k == 10 { 1e9 } else { 0.5 }, &[1.0]).unwrap().action);
     }
     assert_eq!(actions[11], Action::NotReady);
-    assert_eq!(actions[13], Action::Updated);
+    // Of two parameters, constant samples tell of one direction only.
+    assert_eq!(actions[13], Action::Capped);
     assert!(plant.estimator().parameters().iter().all(|theta| theta.is_finite()));
 }

@@ -58,8 +58,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let growth = variance * T::from_count(self.bounds.len()) / T::from_count(100);
         let (factor, bounds) = (self.covariance.as_mut_slice(), self.bounds.as_slice());
         let turn = usize::from(self.turn);
-        // A parameter that is held stays.
-        if ud::diagonal(factor, bounds.len(), turn).is_zero() {
+        // A parameter that is known stays so, and none becomes less sure than its bound.
+        let variance = ud::diagonal(factor, bounds.len(), turn);
+        if variance.is_zero() || bounds.get(turn).is_none_or(|&bound| variance > bound) {
             return;
         }
         self.bounds.shape_generic().0.with_scratch(&mut self.scratch, |[unit], []| {
@@ -131,7 +132,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// By how much the variances of the prior that an exact start takes out are above p_j. With forgetting it cannot
-    /// be more than 1: an estimate that is less sure than the cap lets it be would be held where it is.
+    /// be more than 1: an estimate that is less sure than its bound counts as not known.
     pub(super) fn width(&self) -> T {
         let wide = self.phase == Phase::Collecting && !self.forgetting.forgets();
         if wide { T::from_count(10_000) } else { T::one() }

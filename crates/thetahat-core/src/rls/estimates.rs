@@ -3,9 +3,9 @@
 use nalgebra::{Const, OMatrix, OVector};
 
 use super::RecursiveLeastSquares;
-use super::sample::scale_variances;
 use crate::error::check_length;
-use crate::{Covariance, Dimension, Error, Real, ud};
+use crate::triangle::{column, diagonal_mut};
+use crate::{Action, Covariance, Dimension, Error, Real, ud};
 
 impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// σ̂²: the variance of the noise, in the unit of y²; `None` until enough samples are in. See
@@ -46,6 +46,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     /// The parameters θ̂, n x m.
     pub fn parameters(&self) -> &OMatrix<T, N, M> {
         &self.parameters
+    }
+
+    /// The part of the innovation of an outlier that was not used; `None` of other samples, and of outliers right after others.
+    #[inline(always)]
+    pub(crate) fn unused(&self, nis: T, action: Action) -> Option<T> {
+        self.outliers.unused(nis, action)
     }
 
     /// Takes back what is known of the noise, where the errors that corrected are not those of white noise.
@@ -93,7 +99,12 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     pub fn parameter_covariance_of(&self, output: usize) -> Option<Covariance<T, N>> {
         let n = self.bounds.len();
         let mut covariance = self.covariance.clone();
-        scale_variances(covariance.as_mut_slice(), n, self.variance_scale(output)?);
+        for index in 0..n {
+            let scale = self.variance_scale(output, index)?;
+            if let Some(variance) = diagonal_mut(covariance.as_mut_slice(), n, index) {
+                *variance *= scale;
+            }
+        }
         let finite = (0..n).all(|index| ud::diagonal(covariance.as_slice(), n, index).is_finite());
         finite.then_some(covariance)
     }
@@ -108,19 +119,27 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
 
     /// Writes the standard errors of one output; says whether they are known.
     fn fill_standard_errors(&self, output: usize, errors: &mut [T]) -> bool {
-        let Some(scale) = self.variance_scale(output) else { return false };
-        ud::diagonals(self.covariance.as_slice(), scale, errors);
+        errors.fill(T::zero());
+        for index in 0..errors.len() {
+            let Some(scale) = self.variance_scale(output, index) else { return false };
+            ud::add_squares(self.covariance.as_slice(), scale, index, errors);
+        }
         let known = errors.iter().all(T::is_finite);
         errors.iter_mut().for_each(|error| *error = error.sqrt());
         known
     }
 
-    /// What makes P the covariance of the parameters of one output.
-    fn variance_scale(&self, output: usize) -> Option<T> {
+    /// What makes P the covariance of the parameters of one output, in the direction of one column of U. Where nothing
+    /// is forgotten the noise is at least that at which it was held: what fell silent since says nothing of it.
+    fn variance_scale(&self, output: usize, index: usize) -> Option<T> {
+        let (n, residuals) = (self.bounds.len(), &self.residuals);
+        let noise = *residuals.mean_squares.as_slice().get(output)?;
+        let kept = *column(self.noises.as_slice(), n, output).get(index)?;
+        let held = self.held.as_slice().get(index).is_some_and(|held| *held);
         let share = match self.forgetting.walk() {
-            Some(_) => T::one(),
-            None => self.residuals.squared_weights / self.residuals.weights,
+            None if !held => residuals.squared_weights / residuals.weights,
+            _ => T::one(),
         };
-        Some(self.residuals.variance(output, self.bounds.len())? * share)
+        Some(residuals.variance_of(noise.max(kept), n)? * share)
     }
 }

@@ -117,7 +117,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     }
 
     /// Sets the parameters, and nothing else.
-    pub(crate) fn set_parameters(&mut self, parameters: &[T]) {
+    pub(crate) fn put_parameters(&mut self, parameters: &[T]) {
         ud::copy(parameters, self.parameters.as_mut_slice());
     }
 

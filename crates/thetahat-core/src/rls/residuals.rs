@@ -42,7 +42,12 @@ impl<T: Real, M: Dimension> Residuals<T, M> {
 
     /// σ̂² of one output, if it is known.
     pub(super) fn variance(&self, output: usize, size: usize) -> Option<T> {
-        let mean_square = *self.mean_squares.as_slice().get(output)?;
+        self.variance_of(*self.mean_squares.as_slice().get(output)?, size)
+    }
+
+    /// σ̂² that a mean square makes, now.
+    #[inline(always)]
+    pub(super) fn variance_of(&self, mean_square: T, size: usize) -> Option<T> {
         let square = self.weights * self.weights;
         let freedom = square - T::from_count(size) * self.squared_weights;
         (freedom > T::zero()).then(|| mean_square * square / freedom)

@@ -3,6 +3,7 @@
 use crate::error::check_length;
 use crate::forgetting::{Forgetting, Phase};
 use crate::lags::is_infinite;
+use crate::outliers::Outlier;
 use crate::triangle::{column_mut, diagonal_mut};
 use crate::ud::{add_multiple, dot};
 use crate::{Action, Dimension, Error, Real, RecursiveLeastSquares, ud};
@@ -52,36 +53,66 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         let running = self.phase.is_running();
         let policy = if running { self.forgetting } else { Forgetting::None };
         let resting = !self.adapting || self.is_in_dead_zone(errors);
-        let (adapting, weight, with_prior) =
-            (self.adapting, policy.factor(), self.phase != Phase::Free && running);
-        let RecursiveLeastSquares { parameters, covariance, residuals, .. } = self;
-        let factor = covariance.as_mut_slice();
+        let (adapting, with_prior) = (self.adapting, self.phase != Phase::Free && running);
+        let RecursiveLeastSquares {
+            parameters,
+            covariance,
+            residuals,
+            held,
+            held_columns,
+            noises,
+            outliers,
+            ..
+        } = self;
+        let (factor, any_held) = (covariance.as_mut_slice(), *held_columns > 0);
         // Only what is needed in each step is in here: what a function out of line is given cannot stay in registers.
         let (nis, mut action) = size.with_scratch(&mut self.scratch, |[f, v], []| {
             let spread = ud::project(factor, gradient, f, v, T::zero());
             check_small(gradient, errors, spread)?;
             // Nothing can fail from here on.
             let rule = if resting { Forgetting::None } else { policy };
-            let spread = rule.forget_directions(factor, f, v, spread);
-            let noise = rule.factor_at(errors, spread);
+            let lambda = rule.factor_at(errors, spread);
+            // One λ for all columns is left to the update.
+            let (noise, spread) = match rule.silence() {
+                None if !any_held => (lambda, spread),
+                silence => {
+                    let known = (noises.as_mut_slice(), residuals.mean_squares.as_slice());
+                    (T::one(), forget_columns(factor, f, v, lambda, silence, held.as_slice(), known))
+                }
+            };
             // The divisions for the innovation come first: they go on beside those of the update.
             let (total, growth) = (noise + spread, T::one() / noise);
-            let nis = residuals.normalise(errors, variances, n, total * growth);
+            let ratio = total * growth;
+            let nis = residuals.normalise(errors, variances, n, ratio);
             if !adapting {
                 return Ok((nis, Action::Frozen));
             }
             // P does not shrink in a dead zone, but the estimate is better than it says.
             let (mut share, mut action) = (T::one(), Action::Skipped);
-            let weight = if rule.follows_innovation() { noise } else { weight };
+            let weight = if resting { policy.factor() } else { lambda };
             if !resting {
-                let inverse = ud::update(factor, f, v, noise, growth);
-                // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
-                // out does so from the residuals too: then every sample counts.
-                let fixing = with_prior && total * growth > T::from_count(11);
-                share = if fixing { T::zero() } else { noise * inverse };
-                action = Action::Updated;
+                // An outlier corrects by less, and P shrinks as by a sample with so much more noise.
+                let outlier = (nis > outliers.limit && running).then(|| outliers.judge(nis));
+                let (noisy, growth) = match &outlier {
+                    None => (noise, growth),
+                    Some(outlier) => (noise * outlier.noise, outlier.growth(growth)),
+                };
+                let inverse = ud::update(factor, f, v, noisy, growth);
+                let gain;
+                (gain, share, action) = match outlier {
+                    None => {
+                        outliers.in_a_row = 0;
+                        // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
+                        // out does so from the residuals too: then every sample counts.
+                        let fixing = with_prior && ratio > T::from_count(11);
+                        (inverse, if fixing { T::zero() } else { noise * inverse }, Action::Updated)
+                    }
+                    Some(Outlier { used, counted, action, .. }) => {
+                        (used / total, counted * noise / total, action)
+                    }
+                };
                 for (index, &error) in errors.iter().enumerate() {
-                    if move_by(column_mut(parameters.as_mut_slice(), n, index), v, error * inverse) {
+                    if move_by(column_mut(parameters.as_mut_slice(), n, index), v, error * gain) {
                         action = Action::Projected;
                     }
                 }
@@ -102,41 +133,61 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         if !policy.forgets() {
             return Ok((nis, action));
         }
-        if self.cap() && action == Action::Updated {
+        if self.hold() && action == Action::Updated {
             action = Action::Capped;
         }
         Ok((nis, action))
     }
 
-    /// Brings P_jj back to p_j, if it is above, for the parameter whose turn it is; the next one is next.
+    /// Compares the variance whose turn it is with its bound; the next one is next. Returns whether any column is held.
     #[inline(always)]
-    pub(super) fn cap(&mut self) -> bool {
+    pub(super) fn hold(&mut self) -> bool {
         let (turn, n) = (usize::from(self.turn), self.bounds.len());
-        let variance = ud::diagonal(self.covariance.as_slice(), n, turn);
         let bound = self.bounds.as_slice().get(turn).copied().unwrap_or(T::INFINITY);
-        let above = variance > bound;
-        if above {
-            // In this order nothing overflows.
-            self.bring_back(bound / ((variance - bound) / variance));
+        let is_above = ud::diagonal(self.covariance.as_slice(), n, turn) > bound;
+        if is_above || self.held.as_slice().get(turn).is_some_and(|held| *held) {
+            self.look(turn, is_above);
         }
         self.turn = if turn + 1 < n { self.turn + 1 } else { 0 };
-        above
+        self.held_columns > 0
     }
 
-    /// Absorbs a measurement of the parameter whose turn it is, with this noise variance, whose innovation is 0.
+    /// Where P_ii > p_i, holds the columns of U that make at least p_i/n of it. If column i is held: keeps its noise, and
+    /// lets it go once it makes at most p_k/(2 n) of any P_kk.
     #[cold]
     #[inline(never)]
-    fn bring_back(&mut self, noise: T) {
-        // This is a prior again.
-        if self.phase == Phase::Free {
+    fn look(&mut self, row: usize, is_above: bool) {
+        let n = self.bounds.len();
+        let RecursiveLeastSquares { covariance, bounds, held, residuals, noises, .. } = self;
+        let (factor, held) = (covariance.as_slice(), held.as_mut_slice());
+        let mut set = |held: &mut bool, index: usize, holds: bool| {
+            *held = holds;
+            keep_noise(noises.as_mut_slice(), residuals.mean_squares.as_slice(), n, index, holds);
+        };
+        // D_j U_ij² n/p_i
+        let count = T::from_count(n);
+        let share = |row: usize, index: usize| {
+            let entry = if row == index { T::one() } else { ud::entry(factor, n, row, index) };
+            let bound = bounds.as_slice().get(row).copied().unwrap_or(T::one());
+            ud::variance(factor, n, index) * entry / bound * entry * count
+        };
+        if let Some(held) = held.get_mut(row).filter(|held| **held) {
+            let makes_little = (0..=row).all(|other| share(other, row) * T::from_count(2) < T::one());
+            set(held, row, !makes_little);
+        }
+        if is_above {
+            for (index, held) in held.iter_mut().enumerate().skip(row) {
+                if share(row, index) >= T::one() {
+                    set(held, index, true);
+                }
+            }
+        }
+        let any = held.iter().filter(|held| **held).count();
+        // What is not known is a prior again.
+        if any > 0 && self.phase == Phase::Free {
             self.phase = Phase::Running;
         }
-        let (size, turn) = (self.covariance.size(), usize::from(self.turn));
-        let factor = self.covariance.as_mut_slice();
-        size.with_scratch(&mut self.scratch, |[f, v], []| {
-            measure_one(factor, turn, f, v);
-            ud::update(factor, f, v, noise, T::one());
-        });
+        self.held_columns = u16::try_from(any).unwrap_or(u16::MAX);
     }
 
     fn is_in_dead_zone(&self, errors: &[T]) -> bool {
@@ -178,13 +229,46 @@ fn check_small<T: Real>(gradient: &[T], errors: &[T], spread: T) -> Result<(), E
     Ok(())
 }
 
-/// P <- `scale` P.
+/// D_j <- D_j/λ, of the columns that are not held and tell more than `silence`, given f = U'φ and v = D f. Keeps v = D f;
+/// returns φ'P φ.
 #[inline(always)]
-pub(super) fn scale_variances<T: Real>(factor: &mut [T], size: usize, scale: T) {
-    for index in 0..size {
-        if let Some(variance) = diagonal_mut(factor, size, index) {
-            *variance *= scale;
+fn forget_columns<T: Real>(
+    factor: &mut [T],
+    f: &[T],
+    v: &mut [T],
+    lambda: T,
+    silence: Option<T>,
+    held: &[bool],
+    (noises, mean_squares): (&mut [T], &[T]),
+) -> T {
+    let (growth, size, mut spread) = (T::one() / lambda, f.len(), T::zero());
+    for (index, ((&f, v), &held)) in f.iter().zip(v).zip(held).enumerate() {
+        let is_silent = silence.is_some_and(|least| f * *v <= least);
+        if !held {
+            if silence.is_some() {
+                keep_noise(noises, mean_squares, size, index, is_silent);
+            }
+            if !is_silent && let Some(variance) = diagonal_mut(factor, size, index) {
+                *variance *= growth;
+                *v *= growth;
+            }
         }
+        spread += f * *v;
+    }
+    spread
+}
+
+/// Keeps the largest v of the noise while a column is not forgotten.
+#[inline(always)]
+fn keep_noise<T: Real>(noises: &mut [T], mean_squares: &[T], size: usize, index: usize, keeps: bool) {
+    for (kept, &noise) in noises.iter_mut().skip(index).step_by(size.max(1)).zip(mean_squares) {
+        *kept = if !keeps {
+            T::zero()
+        } else if noise > *kept {
+            noise
+        } else {
+            *kept
+        };
     }
 }
 

@@ -5,11 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::after::After;
 use super::residuals::Residuals;
-use super::{check_parameters, is_prior};
+use super::settings::{check_parameters, is_prior};
 use crate::error::{check_finite, check_length};
 use crate::forgetting::{Forgetting, Phase};
+use crate::outliers::Watch;
 use crate::snapshot::{matrix, vector};
-use crate::{Covariance, Dimension, Error, Real, RecursiveLeastSquares, SnapshotVersion};
+use crate::{Covariance, Dimension, Error, Outliers, Real, RecursiveLeastSquares, SnapshotVersion};
 
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
@@ -23,6 +24,12 @@ pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
     residuals: Residuals<T, M>,
     forgetting: Forgetting<T>,
     dead_zone: T,
+    outliers: Outliers<T>,
+    outliers_in_a_row: u16,
+    #[serde(with = "vector")]
+    held: OVector<bool, N>,
+    #[serde(with = "matrix")]
+    noises: OMatrix<T, N, M>,
     turn: u16,
     phase: Phase,
     shares: u16,
@@ -41,6 +48,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<RecursiveLeastSqua
             residuals,
             forgetting,
             dead_zone,
+            outliers,
+            held,
+            noises,
             turn,
             phase,
             shares,
@@ -57,6 +67,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<RecursiveLeastSqua
             residuals,
             forgetting,
             dead_zone,
+            outliers: outliers.rule(),
+            outliers_in_a_row: outliers.in_a_row,
+            held,
+            noises,
             turn,
             phase,
             shares,
@@ -79,12 +93,14 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> TryFrom<Snapshot<T, N, 
         let n = size.value();
         check_length("covariance", n, covariance.size().value())?;
         read.forgetting.check(n)?;
+        let mut outliers = Watch::new(read.outliers)?;
+        outliers.in_a_row = read.outliers_in_a_row;
         let in_range =
             |argument, fits: bool, range| fits.then_some(()).ok_or(Error::OutOfRange { argument, range });
         let of_scales = |&bound: &T| is_prior(bound) && is_prior(T::from_count(10_000) / bound);
         in_range("bounds", bounds.iter().all(of_scales), "those of scales that a new estimator takes")?;
         check_parameters(parameters.as_slice(), bounds.as_slice())?;
-        // An exact start without forgetting has variances 10⁴ times as wide, and a cap comes late.
+        // An exact start without forgetting has variances 10⁴ times as wide, and each column of U adds up to the bound.
         let most = T::from_count(40_000);
         let known = covariance.variances().iter().all(|&variance| is_prior(variance / most));
         known.then_some(()).ok_or(Error::TooLarge { argument: "covariance" })?;
@@ -105,7 +121,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> TryFrom<Snapshot<T, N, 
         in_range("turn", usize::from(read.turn) < n.max(1), "below the number of parameters")?;
         let shared = read.phase.is_running() || 0 < read.shares_left && read.shares_left <= read.shares;
         in_range("shares_left", shared, "such that a share of the prior is left")?;
-        let Snapshot { forgetting, dead_zone, turn, phase, shares, shares_left, adapting, .. } = read;
+        let Snapshot {
+            forgetting, dead_zone, held, noises, turn, phase, shares, shares_left, adapting, ..
+        } = read;
+        let held_columns = held.iter().fold(0, |count: u16, &held| count.saturating_add(held.into()));
         let scratch = size.scratch::<T, 2, 0>();
         Ok(RecursiveLeastSquares {
             parameters,
@@ -114,6 +133,10 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> TryFrom<Snapshot<T, N, 
             residuals,
             forgetting,
             dead_zone,
+            outliers,
+            held,
+            held_columns,
+            noises,
             turn,
             phase,
             shares,

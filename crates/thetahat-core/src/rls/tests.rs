@@ -123,7 +123,7 @@ fn with_forgetting_it_is_weighted_least_squares() {
     let theta = Vector4::new(1.0, -2.0, 0.5, 3.0);
     let data = samples(1, &theta, 0.3, 60);
     let prior = SVector::repeat(2.0);
-    // A prior well below the bound, so that no cap comes in between.
+    // A prior well below the bound, so that nothing is held in between.
     let mut estimator = estimator(Forgetting::Exponential { factor })
         .with_covariance(Covariance::from_diagonal(&prior).unwrap())
         .unwrap();
@@ -355,7 +355,7 @@ fn the_noise_variance_after_an_exact_start_is_that_of_the_batch() {
     }
     assert!(compared > 400, "{compared}");
 
-    // Once a variance has been brought back to its bound there is a prior again.
+    // Once a variance is at its bound, that is a prior again.
     let policy = Forgetting::Exponential { factor: 0.8 };
     let mut estimator = estimator::<f64, 1>(policy).with_start(RlsStart::Exact).unwrap();
     estimator.update(&Vector1::new(1.0), 2.0).unwrap();

@@ -281,10 +281,10 @@ impl Observation<f64, Const<2>, Const<1>> for Range {
     fn output(&self, x: &Vector2<f64>, _: &None) -> Vector1<f64> {
         Vector1::new(x.norm())
     }
-    fn jacobian(&self, x: &Vector2<f64>, _: &None) -> RowVector2<f64> {
+    fn output_jacobian(&self, x: &Vector2<f64>, _: &None) -> RowVector2<f64> {
         x.transpose() / x.norm()
     }
-    fn noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<1>> {
+    fn measurement_noise(&self, _: &Vector2<f64>, _: &None) -> Covariance<f64, Const<1>> {
         Covariance::from_diagonal(&Vector1::new(1e-4)).unwrap()
     }
 }

@@ -3,8 +3,8 @@
 use serde_json::json;
 use thetahat_core::nalgebra::Const;
 use thetahat_core::{
-    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
-    ResponseWanted, RstController, Sensor, TunerOrders, TunerSettings,
+    DirectOrders, DirectSelfTuner, Error, Fallback, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
+    ResponseWanted, RstController, Sensor, Supervision, TunerOrders, TunerSettings,
 };
 
 use super::{check, output, refuses, value};
@@ -32,7 +32,8 @@ fn settings() -> TunerSettings<f64> {
     let response = ResponseWanted { frequency: 0.4, damping: 0.8, observer: 0.3 };
     let sensor = Sensor { range: -5.0..=f64::INFINITY, ..Sensor::default() };
     let usual = TunerSettings::new(response, f64::NEG_INFINITY..=8.0, 1.0);
-    TunerSettings { sensor, probing: Probing { at_most: 20, ..usual.probing }, ..usual }
+    let supervision = Supervision { replace_old: true, ..usual.supervision };
+    TunerSettings { sensor, probing: Probing { at_most: 20, ..usual.probing }, supervision, ..usual }
 }
 
 const FORGETTING: Forgetting<f64> = Forgetting::Exponential { factor: 0.98 };
@@ -54,12 +55,32 @@ fn indirect_self_tuners() -> Result<(), Error> {
     });
     assert!(running.controller().is_some());
     check(running.clone(), step);
+    // No margins are good enough: it is not trusted, with any fallback.
+    for fallback in [Fallback::Hold, Fallback::LastGood, Fallback::Input(0.5)] {
+        let mut doubted = running.clone().with_peaks(1.0, 1.0)?;
+        doubted.set_fallback(fallback)?;
+        let step = |tuner: &mut Tuner, k: usize| {
+            let told = (step(tuner, k), tuner.distrust(), tuner.design_age());
+            // NaN is not itself.
+            (told, tuner.innovation().error.to_bits())
+        };
+        (0..300).for_each(|k| {
+            step(&mut doubted, k);
+        });
+        assert!(doubted.distrust().is_some());
+        check(doubted, step);
+    }
     refuses(
         &running,
         &[
             ("/closed/past/inputs/2/0", &[json!("NaN"), json!("inf")][..]),
             ("/closed/share", &[json!(2.0)]),
             ("/closed/signs", &[json!(0)]),
+            ("/closed/supervisor/failures", &[json!(6)]),
+            ("/closed/supervisor/sound", &[json!(64)]),
+            ("/closed/supervisor/held", &[json!(null)]),
+            ("/closed/settings/supervision/excitation", &[json!(-1.0), json!("NaN")]),
+            ("/closed/settings/supervision/fallback", &[json!({"Input": "NaN"})]),
             ("/closed/settings/response/damping", &[json!(3.0)]),
             ("/closed/settings/limits", &[json!([1.0, 0.0])]),
             ("/design_every", &[json!(0)]),

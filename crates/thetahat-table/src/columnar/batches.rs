@@ -17,10 +17,13 @@ use parquet::arrow::arrow_reader::{
 };
 
 use super::super::error::{Error, escaped};
+use super::super::memory::Bound;
 use super::super::source::{Bytes, Format};
 use super::footer;
-use super::messages::{Blocks, Messages};
+use super::messages::{Blocks, Limits, Messages};
 
+/// The header of a page of Parquet is shorter, but for long texts among its statistics.
+const PAGE_HEADER: u64 = 1 << 12;
 /// The rows of a batch of Parquet, at most. What Arrow writes comes as it was written.
 const BATCH: usize = 1 << 14;
 
@@ -40,25 +43,34 @@ pub(super) enum Opened {
         name: String,
         file: File,
         length: u64,
+        bound: Option<Bound>,
         metadata: ArrowReaderMetadata,
     },
     File {
         name: String,
         file: File,
         length: u64,
+        schema: SchemaRef,
         blocks: Option<Blocks>,
     },
-    /// From the schema on.
     Stream {
         name: String,
-        bytes: Box<dyn Read + Send>,
+        schema: SchemaRef,
+        /// What was read for the schema, and what follows.
+        start: Vec<u8>,
+        bytes: Messages<BufReader<Box<dyn Read + Send>>>,
         bytes_read: Arc<AtomicU64>,
         total: Option<u64>,
     },
 }
 
 impl Opened {
-    pub(super) fn new(path: &Path, bytes: Bytes, format: Format) -> Result<(Self, SchemaRef), Error> {
+    pub(super) fn new(
+        path: &Path,
+        bytes: Bytes,
+        format: Format,
+        bound: Option<Bound>,
+    ) -> Result<(Self, SchemaRef), Error> {
         let name = bytes.name().to_owned();
         let refusal = |message: String| Err(Error::data(&name, None, message));
         match format {
@@ -80,31 +92,36 @@ impl Opened {
                 "{} is read from its end, and this one was compressed as a whole; unpack it (gunzip)",
                 named(format)
             )),
-            Format::Parquet => Self::parquet(path, name),
-            Format::ArrowFile => Self::file(path, name),
+            Format::Parquet => Self::parquet(path, name, bound),
+            Format::ArrowFile => Self::file(path, name, Limits::new(bound)),
             Format::ArrowStream => {
                 let (bytes_read, total) = bytes.progress();
                 // A message begins with a few bytes each.
-                let bytes = Messages::new(BufReader::with_capacity(1 << 16, bytes.into_reader()));
+                let bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());
+                let bytes = Messages::new(bytes, Limits::new(bound));
                 let mut kept = Kept { bytes, copy: Vec::new() };
                 let stream: Box<dyn Read + Send + '_> = Box::new(&mut kept);
                 let schema = guarded(|| StreamReader::try_new(stream, None).map(|reader| reader.schema()))
                     .map_err(|error| damaged(&name, 0, &error))?;
-                let bytes = Box::new(Cursor::new(kept.copy).chain(kept.bytes));
-                Ok((Self::Stream { name, bytes, bytes_read, total }, schema))
+                let Kept { bytes, copy: start } = kept;
+                Ok((
+                    Self::Stream { name, schema: Arc::clone(&schema), start, bytes, bytes_read, total },
+                    schema,
+                ))
             }
         }
     }
 
-    fn file(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+    fn file(path: &Path, name: String, limits: Limits) -> Result<(Self, SchemaRef), Error> {
         let (file, length) = opened(path, &name)?;
-        let blocks = Blocks::of(opened(path, &name)?.0).map_err(|error| damaged(&name, 0, &error.into()))?;
+        let blocks =
+            Blocks::of(opened(path, &name)?.0, limits).map_err(|error| damaged(&name, 0, &error.into()))?;
         let schema = guarded(|| Ok(FileReader::try_new(BufReader::new(file.try_clone()?), None)?.schema()))
             .map_err(|error| no_whole_file(&name, "Arrow", &error))?;
-        Ok((Self::File { name, file, length, blocks }, schema))
+        Ok((Self::File { name, file, length, schema: Arc::clone(&schema), blocks }, schema))
     }
 
-    fn parquet(path: &Path, name: String) -> Result<(Self, SchemaRef), Error> {
+    fn parquet(path: &Path, name: String, bound: Option<Bound>) -> Result<(Self, SchemaRef), Error> {
         let (file, length) = opened(path, &name)?;
         let directory = directory(&file, length).map_err(|error| damaged(&name, 0, &error.into()))?;
         if let Some(fault) = directory.and_then(|directory| footer::fault(&directory)) {
@@ -113,7 +130,7 @@ impl Opened {
         let load = || Ok(ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())?);
         let metadata = guarded(load).map_err(|error| no_whole_file(&name, "Parquet", &error))?;
         let schema = Arc::clone(metadata.schema());
-        Ok((Self::Parquet { name, file, length, metadata }, schema))
+        Ok((Self::Parquet { name, file, length, bound, metadata }, schema))
     }
 
     /// How many rows there are, if it is known.
@@ -126,27 +143,39 @@ impl Opened {
         }
     }
 
-    /// The rows of some columns, given in ascending order; an error is a message.
-    pub(super) fn batches(self, columns: &[usize]) -> Result<Batches, String> {
+    /// The rows of some columns, given in ascending order.
+    pub(super) fn batches(self, columns: &[usize]) -> Result<Batches, Error> {
         let rows = self.rows().unwrap_or(0) as u64;
-        let said = |error: ArrowError| format!("it cannot be read: {}", escaped(&error.to_string()));
+        let said = |name: &str, error: ArrowError| {
+            Error::data(name, None, format!("it cannot be read: {}", escaped(&error.to_string())))
+        };
         let columns = columns.to_vec();
         let (name, form) = match self {
-            Self::Parquet { name, file, length, metadata } => {
+            Self::Parquet { name, file, length, bound, metadata } => {
                 let mask = ProjectionMask::roots(metadata.parquet_schema(), columns);
+                if let Some(bound) = bound {
+                    let largest = || Ok(largest_pages(&file, &metadata, &mask)?);
+                    let bytes = guarded(largest).map_err(|error| damaged(&name, 0, &error))?;
+                    if let Some(words) = bound.passed_by_bytes(bytes) {
+                        return Err(Error::memory(&name, None, &words));
+                    }
+                }
                 let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, metadata);
                 let build = || Ok(builder.with_projection(mask).with_batch_size(BATCH).build()?);
-                let reader = Box::new(guarded(build).map_err(said)?);
+                let reader = Box::new(guarded(build).map_err(|error| said(&name, error))?);
                 (name, Form::Parquet { reader, length, of: rows })
             }
-            Self::File { name, file, length, blocks } => {
+            Self::File { name, file, length, schema, mut blocks } => {
+                blocks.iter_mut().for_each(|blocks| blocks.limits.select(&schema, &columns));
                 let build = || FileReader::try_new(BufReader::new(file), Some(columns));
-                let reader = Box::new(guarded(build).map_err(said)?);
+                let reader = Box::new(guarded(build).map_err(|error| said(&name, error))?);
                 (name, Form::File { reader, length, blocks, read: 0 })
             }
-            Self::Stream { name, bytes, bytes_read, total } => {
+            Self::Stream { name, schema, start, mut bytes, bytes_read, total } => {
+                bytes.limits.select(&schema, &columns);
+                let bytes: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(bytes));
                 let build = || StreamReader::try_new(bytes, Some(columns));
-                let reader = Box::new(guarded(build).map_err(said)?);
+                let reader = Box::new(guarded(build).map_err(|error| said(&name, error))?);
                 (name, Form::Stream { reader, bytes_read, total })
             }
         };
@@ -283,6 +312,37 @@ fn directory(mut file: &File, length: u64) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(directory))
 }
 
+/// What the pages of the columns take that are unpacked at once, in the group of rows where that is most: of each column its first
+/// one, which may be its dictionary, and the largest of the others.
+fn largest_pages(mut file: &File, metadata: &ArrowReaderMetadata, mask: &ProjectionMask) -> io::Result<u64> {
+    let mut most = 0;
+    let mut header = Vec::new();
+    for group in metadata.metadata().row_groups() {
+        let mut bytes: u64 = 0;
+        for (_, column) in group.columns().iter().enumerate().filter(|(leaf, _)| mask.leaf_included(*leaf)) {
+            let (mut place, length) = column.byte_range();
+            let end = place.saturating_add(length);
+            let (mut first, mut largest) = (None, 0);
+            while place < end {
+                header.clear();
+                file.seek(SeekFrom::Start(place))?;
+                file.take(PAGE_HEADER.min(end - place)).read_to_end(&mut header)?;
+                // A header that is longer, or cut, is left to the reader.
+                let Some((own, unpacked, stored)) = footer::page(&header) else { break };
+                place = place.saturating_add(own).saturating_add(stored);
+                match first {
+                    None => first = Some(unpacked),
+                    Some(_) => largest = largest.max(unpacked),
+                }
+            }
+            bytes = bytes.saturating_add(first.unwrap_or(0)).saturating_add(largest);
+        }
+        most = most.max(bytes);
+    }
+    file.seek(SeekFrom::Start(0))?;
+    Ok(most)
+}
+
 fn no_whole_file(name: &str, format: &str, error: &ArrowError) -> Error {
     let reason = escaped(&error.to_string());
     let message = format!("this is no whole {format} file ({reason}); copy it again, or write it anew");
@@ -292,6 +352,9 @@ fn no_whole_file(name: &str, format: &str, error: &ArrowError) -> Error {
 /// Says what an error of a reader means after so many rows.
 fn damaged(name: &str, rows: u64, error: &ArrowError) -> Error {
     match error {
+        ArrowError::IoError(_, error) if error.kind() == io::ErrorKind::OutOfMemory => {
+            Error::memory(name, None, &error.to_string())
+        }
         ArrowError::IoError(_, error) if error.kind() == io::ErrorKind::UnexpectedEof => {
             let message =
                 format!("it ends too early, after {rows} whole rows: it is truncated; copy it again");

@@ -1,5 +1,7 @@
 //! The column of times.
 
+use std::collections::TryReserveError;
+
 use arrow_array::Array;
 use jiff::Timestamp;
 use jiff::fmt::temporal::Pieces;
@@ -70,12 +72,21 @@ impl Clock {
     }
 
     /// Appends the times in seconds; where there is none it is NaN, and `fault` is told the row of the array.
-    pub(super) fn append(&self, array: &dyn Array, out: &mut Vec<f64>, fault: &mut impl FnMut(usize, &str)) {
+    ///
+    /// # Errors
+    /// That there is no memory for as many.
+    pub(super) fn append(
+        &self,
+        array: &dyn Array,
+        out: &mut Vec<f64>,
+        fault: &mut impl FnMut(usize, &str),
+    ) -> Result<(), TryReserveError> {
+        out.try_reserve(array.len())?;
         let before = out.len();
         let seconds = |nanoseconds: i128| nanoseconds as f64 / 1e9;
         match &self.ticks {
             Ticks::Seconds => {
-                numbers(array, out);
+                numbers(array, out)?;
             }
             Ticks::Durations(unit) => out.extend(
                 times(array)
@@ -94,13 +105,14 @@ impl Clock {
                         fault(row, &message);
                     }
                 }
-                return;
+                return Ok(());
             }
         }
         for (row, time) in out.iter_mut().skip(before).enumerate().filter(|(_, time)| !time.is_finite()) {
             *time = f64::NAN;
             fault(row, time::MISSING);
         }
+        Ok(())
     }
 }
 

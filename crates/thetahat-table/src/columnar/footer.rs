@@ -37,10 +37,33 @@ pub(super) fn fault(directory: &[u8]) -> Option<&'static str> {
     None
 }
 
+/// The header of a page: its own length, the bytes that the page has unpacked, and as it is stored. None where it is cut.
+pub(super) fn page(bytes: &[u8]) -> Option<(u64, u64, u64)> {
+    let mut thrift = Thrift { bytes, children: Vec::new() };
+    let (mut field, mut unpacked, mut stored) = (0, 0, 0);
+    loop {
+        let head = thrift.byte()?;
+        if head == 0 {
+            break;
+        }
+        field = match u64::from(head >> 4) {
+            0 => zigzag(thrift.integer()?),
+            step => field + step,
+        };
+        match field {
+            2 if head & 15 == I32 => unpacked = zigzag(thrift.integer()?),
+            3 if head & 15 == I32 => stored = zigzag(thrift.integer()?),
+            _ => thrift.value(head & 15, &mut Vec::new(), true)?,
+        }
+    }
+    Some(((bytes.len() - thrift.bytes.len()) as u64, unpacked, stored))
+}
+
 /// Types of values, as fields and lists name them.
 const TRUE: u8 = 1;
 const FALSE: u8 = 2;
 const BYTE: u8 = 3;
+const I32: u8 = 5;
 const DOUBLE: u8 = 7;
 const BINARY: u8 = 8;
 const LIST: u8 = 9;

@@ -14,7 +14,8 @@ use parquet::basic::{BrotliLevel, Compression, GzipLevel, ZstdLevel};
 use parquet::file::properties::WriterProperties;
 use tempfile::TempDir;
 
-use crate::{Error, Event, Options, Reader, Selection, Table};
+use crate::memory::Bound;
+use crate::{Error, ErrorKind, Event, Options, Reader, Selection, Table};
 
 /// The formats by the ending of a file's name.
 const FORMATS: [&str; 3] = ["parquet", "arrow", "arrows"];
@@ -540,6 +541,101 @@ fn a_long_constant_column_is_no_damage() {
     writer.finish().unwrap();
     assert!(stream.len() < 10_000, "{}", stream.len());
     assert_eq!(read(&stream, &["y"], None, &Options::default()).unwrap().columns[0], vec![1.0; rows]);
+}
+
+/// An Arrow file and a stream of a batch, packed by zstd.
+fn packed(batch: &RecordBatch) -> [Vec<u8>; 2] {
+    let options = IpcWriteOptions::default().try_with_compression(Some(CompressionType::ZSTD)).unwrap();
+    let (mut file, mut stream) = (Vec::new(), Vec::new());
+    let mut writer = FileWriter::try_new_with_options(&mut file, &batch.schema(), options.clone()).unwrap();
+    writer.write(batch).unwrap();
+    writer.finish().unwrap();
+    let mut writer = StreamWriter::try_new_with_options(&mut stream, &batch.schema(), options).unwrap();
+    writer.write(batch).unwrap();
+    writer.finish().unwrap();
+    [file, stream]
+}
+
+/// A few kilobytes are gigabytes unpacked: they are held against the bound before that, and only what is read counts.
+#[test]
+fn a_batch_is_held_against_the_bound_before_it_is_unpacked() {
+    let rows = 1_000;
+    let long = "x".repeat(10_000);
+    let table = batch(&[
+        ("y", numbers(vec![1.0; rows])),
+        ("note", array(StringArray::from_iter_values(std::iter::repeat_n(&long, rows)))),
+        ("u", numbers(vec![2.0; rows])),
+    ]);
+    let kept = |per_value, free| Options { bound: Some(Bound::of(per_value, free)), ..Options::default() };
+    let refused = |error: Error| {
+        assert_eq!(error.kind(), ErrorKind::Memory);
+        error.to_string().split_once("into memory: ").unwrap().1.to_owned()
+    };
+    for bytes in packed(&table) {
+        assert!(bytes.len() < 20_000, "{}", bytes.len());
+        let options = kept(64, 1_000_000);
+        assert_eq!(read(&bytes, &["y", "u"], None, &options).unwrap().columns[1], vec![2.0; rows]);
+        let words = refused(read(&bytes, &["y"], Some("note"), &options).unwrap_err());
+        assert!(words.starts_with("one of its batches takes 10 MB unpacked, and 1 MB are free; "), "{words}");
+        let words = refused(read(&bytes, &["y", "u"], None, &kept(64, 100_000)).unwrap_err());
+        assert!(words.starts_with("2000 values take 0 MB at 64 bytes each, and 0 MB are free; "), "{words}");
+    }
+}
+
+/// So are the pages of a Parquet file, which say how long they will be.
+#[test]
+fn the_pages_of_a_parquet_file_are_held_against_the_bound() {
+    let rows = 200_000;
+    let table = batch(&[("y", numbers(vec![1.0; rows])), ("u", numbers((0..rows).map(|row| row as f64)))]);
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_dictionary_enabled(false)
+        .set_data_page_row_count_limit(rows)
+        .build();
+    let mut bytes = Vec::new();
+    let mut writer = ArrowWriter::try_new(&mut bytes, table.schema(), Some(properties)).unwrap();
+    writer.write(&table).unwrap();
+    writer.close().unwrap();
+    let with = |free| Options { bound: Some(Bound::of(1, free)), ..Options::default() };
+    // A column has pages of a mebibyte: the first one and another are counted.
+    assert_eq!(read(&bytes, &["y"], None, &with(3_000_000)).unwrap().rows, rows);
+    for (columns, free) in [(&["y", "u"][..], 3_000_000), (&["y"], 1_000_000)] {
+        let error = read(&bytes, columns, None, &with(free)).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Memory);
+        assert!(error.to_string().contains("one of its batches takes "), "{error}");
+    }
+    // Wherever the header of a page is cut, it is none.
+    let header = &bytes[4..];
+    let (length, unpacked, stored) = super::footer::page(header).unwrap();
+    assert!(unpacked > 1_000_000 && stored < 10_000, "{unpacked} {stored}");
+    assert!((0..length as usize).all(|end| super::footer::page(&header[..end]).is_none()));
+}
+
+/// Nulls take no bytes, so any number of rows may be said.
+#[test]
+fn rows_without_bytes_are_held_against_the_bound() {
+    let rows = 1 << 46;
+    let nulls = batch(&[("y", array(NullArray::new(rows)))]);
+    let values: ArrayRef = array(NullArray::new(rows));
+    let dictionary = array(DictionaryArray::<Int8Type>::new(Int8Array::from(vec![0, 1]), values));
+    for table in [nulls, batch(&[("y", dictionary)])] {
+        for format in ["arrow", "arrows"] {
+            for bound in [None, Some(Bound::of(64, 1 << 30))] {
+                let options = Options { bound, ..Options::default() };
+                let bytes = bytes(format, std::slice::from_ref(&table));
+                let error = read(&bytes, &["y"], None, &options).unwrap_err();
+                assert_eq!(error.kind(), ErrorKind::Memory, "{error}");
+            }
+        }
+    }
+}
+
+/// A clock without times is one error, not one for each row.
+#[test]
+fn the_first_fault_of_a_column_is_kept() {
+    let none = array(NullArray::new(3));
+    let table = batch(&[("t", none), ("y", numbers([1.0, f64::INFINITY, f64::INFINITY]))]);
+    assert!(error(&bytes("arrow", &[table]), &["y"], Some("t")).starts_with("column 't', row 1: "));
 }
 
 /// A Parquet file of a schema: how many children each column has, the root first.

@@ -1,5 +1,7 @@
 //! The values of an array as numbers, texts or times, whatever its type.
 
+use std::collections::TryReserveError;
+
 use arrow_array::cast::AsArray;
 use arrow_array::types::*;
 use arrow_array::{Array, ArrowPrimitiveType};
@@ -79,7 +81,11 @@ fn nanoseconds(unit: TimeUnit) -> i64 {
 }
 
 /// Appends numbers; what is null is NaN. Says whether one was rounded, since it is a whole number beyond 2^53.
-pub(super) fn numbers(array: &dyn Array, out: &mut Vec<f64>) -> bool {
+///
+/// # Errors
+/// That there is no memory for as many: nulls take none in a file.
+pub(super) fn numbers(array: &dyn Array, out: &mut Vec<f64>) -> Result<bool, TryReserveError> {
+    out.try_reserve(array.len())?;
     match array.data_type() {
         DataType::Float64 => append::<Float64Type>(array, out, |value| value),
         DataType::Float32 => append::<Float32Type>(array, out, f64::from),
@@ -92,11 +98,11 @@ pub(super) fn numbers(array: &dyn Array, out: &mut Vec<f64>) -> bool {
         DataType::UInt32 => append::<UInt32Type>(array, out, f64::from),
         DataType::Int64 => {
             append::<Int64Type>(array, out, |value| value as f64);
-            return any::<Int64Type>(array, |value| value.unsigned_abs() > EXACT);
+            return Ok(any::<Int64Type>(array, |value| value.unsigned_abs() > EXACT));
         }
         DataType::UInt64 => {
             append::<UInt64Type>(array, out, |value| value as f64);
-            return any::<UInt64Type>(array, |value| value > EXACT);
+            return Ok(any::<UInt64Type>(array, |value| value > EXACT));
         }
         DataType::Decimal32(_, scale) => {
             append::<Decimal32Type>(array, out, |digits| decimal(i128::from(digits), *scale));
@@ -119,17 +125,17 @@ pub(super) fn numbers(array: &dyn Array, out: &mut Vec<f64>) -> bool {
             out.extend(values.into_iter().flat_map(|values| values.iter().map(number)));
         }
         DataType::Dictionary(..) => {
-            let Some(dictionary) = array.as_any_dictionary_opt() else { return false };
-            let mut values = Vec::with_capacity(dictionary.values().len());
-            let rounded = numbers(dictionary.values().as_ref(), &mut values);
+            let Some(dictionary) = array.as_any_dictionary_opt() else { return Ok(false) };
+            let mut values = Vec::new();
+            let rounded = numbers(dictionary.values().as_ref(), &mut values)?;
             let value = |key: Option<usize>| key.and_then(|key| values.get(key).copied()).unwrap_or(f64::NAN);
             out.extend(keys(array).into_iter().map(value));
-            return rounded;
+            return Ok(rounded);
         }
         // A column of nulls.
         _ => out.resize(out.len() + array.len(), f64::NAN),
     }
-    false
+    Ok(false)
 }
 
 /// The texts of an array; None for what is null.

@@ -43,7 +43,7 @@ fn random_table(dice: &mut Dice) -> (String, String) {
                 _ => format!("{}.{:018}e-{:02}", dice.below(10), dice.below(1_000_000_000), dice.below(20)),
             })
             .collect();
-        let end = dice.pick(&["\n", "\n", "\r\n"]);
+        let end = dice.pick(&["\n", "\n", "\r\n", "\r"]);
         let blank = dice.pick(&["", "", " ", "\t "]);
         for field in &fields {
             let separator = if std::ptr::eq(field, &fields[0]) { "" } else { "," };
@@ -117,7 +117,7 @@ fn the_first_mistake_is_told_whatever_the_cuts_and_threads() {
 #[test]
 fn no_bytes_make_it_panic_and_no_cut_makes_a_difference() {
     let mut dice = Dice(7);
-    let words: [&[u8]; 24] = [
+    let words: [&[u8]; 25] = [
         b"1",
         b"-2.5e3",
         b".",
@@ -130,6 +130,7 @@ fn no_bytes_make_it_panic_and_no_cut_makes_a_difference() {
         b"\n",
         b"\n",
         b"\r\n",
+        b"\r",
         b" ",
         b"\t",
         b"#",

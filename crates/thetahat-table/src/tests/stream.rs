@@ -189,3 +189,25 @@ fn a_log_without_rows_or_that_breaks_off_says_so() {
     let events = all(streamed(Cursor::new(packed), &plain(), false));
     assert!(events.last().unwrap().contains("the gzip stream ends too early"), "{:?}", events.last());
 }
+
+/// A row that ends with a carriage return does not wait for the next one.
+#[test]
+fn a_carriage_return_ends_a_row_at_once() {
+    let (write, pieces) = sync_channel(8);
+    let pipe = Pipe { pieces, rest: Cursor::new(b"u,y\r1,2\r".to_vec()) };
+    let mut stream = streamed(pipe, &plain(), true);
+    let mut next = || {
+        loop {
+            match stream.next().unwrap() {
+                Event::Row => break (stream.line(), stream.values().to_vec()),
+                Event::Idle => {}
+                other => panic!("{other:?}"),
+            }
+        }
+    };
+    assert_eq!(next(), (2, vec![2.0, 1.0]));
+    // The newline that belongs to it may come later.
+    write.send(b"\n".to_vec()).unwrap();
+    write.send(b"3,4\r\n".to_vec()).unwrap();
+    assert_eq!(next(), (3, vec![4.0, 3.0]));
+}

@@ -287,7 +287,7 @@ impl Designed {
         let (response, words, feedback) = match &plan.design {
             Design::MinimumVariance { input_weight } => {
                 let (a, b) = (product(&plant.a, &plant.d), product(&plant.b, &plant.d));
-                let wanted = MinimumVariance { input_weight: *input_weight, integrator };
+                let wanted = MinimumVariance::new(*input_weight).with_integrator(integrator);
                 let controller = RstController::minimum_variance(&a, &b, &plant.c, &wanted)
                     .map_err(|error| refused(&error, plan))?;
                 let words = format!("minimum variance, input weight {}{ending}", short(*input_weight));
@@ -332,12 +332,9 @@ impl Designed {
         };
         let orders = PlacementOrders { na, nb, integrator };
         debug_assert!(orders.size() >= room);
-        let wanted = WantedPoles {
-            response: &response,
-            observer: &observer,
-            integrator,
-            cancel_zeros: plan.cancel_zeros,
-        };
+        let wanted = WantedPoles::new(&response, &observer)
+            .with_integrator(integrator)
+            .with_cancelled_zeros(plan.cancel_zeros);
         let controller = RstController::pole_placement(&plant.a, &plant.b, &wanted)
             .map_err(|error| refused(&error, plan))?;
         Ok(Self { controller, words, feedback })

@@ -1,14 +1,14 @@
 //! A program as a header and a source of C99.
 
 use super::head::Head;
-use super::program::{Array, Declared, Entry, Kind, Program, Statement};
+use super::program::{Array, Declared, Entry, Kind, MISSING, Program, Statement};
 use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
 
-/// gcc and clang tell by these names that every number is taken for finite.
+/// gcc and clang tell by the first two names that every number is taken for finite, Microsoft's and Arm's compilers by the others.
 const FINITE_MATH: &str = "
-#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__)
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__) || defined(_M_FP_FAST) || defined(__FP_FAST)
 #error \"A missing number is not finite, which is not seen with -ffast-math or -ffinite-math-only: compile this file without them.\"
 #endif
 ";
@@ -21,20 +21,22 @@ pub(super) fn files(program: &Program, name: &str, precision: Precision, head: &
     let entries: Vec<&Entry> = std::iter::once(&init).chain(&program.entries).collect();
 
     let mut header = "// What one step leaves to the next one.\ntypedef struct {\n".to_owned();
-    for Declared { name, values, doc, .. } in program.arrays.iter().filter(|array| array.kind == Kind::Memory)
-    {
+    for Declared { name, values, doc, .. } in program.arrays.iter().filter(|array| array.is_kept()) {
         header += &format!("    {} {name}[{}]; // {doc}\n", writer.real(), values.len());
     }
     header += &format!("}} {name}_state;\n");
     for entry in &entries {
         header += "\n";
-        entry.doc.iter().for_each(|line| header += &format!("// {line}\n"));
+        entry.comments().for_each(|line| header += &format!("// {line}\n"));
         header += &format!("{};\n", prototype(&program, entry, name, &writer));
     }
 
     let mut functions = String::new();
     for entry in &entries {
-        let body = writer.block(&entry.body, "    ");
+        let mut body = writer.block(&entry.body, "    ");
+        if entry.misses() {
+            body = format!("    unsigned int {MISSING} = 0U;\n{body}    return {MISSING};\n");
+        }
         functions += &format!("\n{}\n{{\n{body}}}\n", prototype(&program, entry, name, &writer));
     }
     let mut source = format!("// See {name}.h.\n\n#include \"{name}.h\"\n\n");
@@ -72,7 +74,7 @@ pub(super) fn header(name: &str, head: &Head, before: &str, declarations: &str) 
 /// The function that puts a state at its start.
 fn init(program: &mut Program) -> Entry {
     let memories: Vec<usize> =
-        (0..program.arrays.len()).filter(|array| program.arrays[*array].kind == Kind::Memory).collect();
+        (0..program.arrays.len()).filter(|array| program.arrays[*array].is_kept()).collect();
     let mut body = Vec::new();
     for memory in memories {
         let Declared { name, values, .. } = program.arrays[memory].clone();
@@ -108,7 +110,8 @@ fn prototype(program: &Program, entry: &Entry, name: &str, writer: &Writer<'_>) 
     arguments.extend(given.map(|(name, length)| format!("const {real} {name}[{length}]")));
     let results = entry.result.iter().filter_map(array);
     arguments.extend(results.map(|(name, length)| format!("{real} {name}[{length}]")));
-    format!("void {name}_{}({})", entry.name, arguments.join(", "))
+    let given = if entry.misses() { "unsigned int" } else { "void" };
+    format!("{given} {name}_{}({})", entry.name, arguments.join(", "))
 }
 
 /// Columns as a table of a program that checks.
@@ -136,25 +139,32 @@ pub(super) fn check(program: &Program, name: &str, precision: Precision, vector:
         text += &table(&writer, label, columns, rows);
     }
     let outputs = vector.expected.len();
+    let misses = program.entries.iter().any(Entry::misses);
+    let counted = if misses { format!("    unsigned int {MISSING} = 0U;\n") } else { String::new() };
     text += &format!(
-        "\nint main(void)\n{{\n    {name}_state state;\n    int wrong = 0;\n    {name}_init(&state);\n"
+        "\nint main(void)\n{{\n    {name}_state state;\n    int wrong = 0;\n{counted}    {name}_init(&state);\n"
     );
     text +=
         &format!("    for (size_t row = 0U; row < {rows}U; row += 1U) {{\n        {real} y[{outputs}];\n");
     for entry in &program.entries {
         let mut arguments = vec!["&state".to_owned()];
-        for array in &entry.arguments {
-            let is_input = program.arrays.get(array.0).is_some_and(|array| array.name == "u");
-            arguments.push(format!("{}[row]", if is_input { "INPUTS" } else { "MEASURED" }));
-        }
+        let given = entry.arguments.iter().filter_map(|array| program.arrays.get(array.0));
+        arguments.extend(given.map(|array| format!("{}[row]", Vector::table_of(&array.name))));
         arguments.extend(entry.result.map(|_| "y".to_owned()));
-        text += &format!("        {name}_{}({});\n", entry.name, arguments.join(", "));
+        let counted = if entry.misses() { format!("{MISSING} += ") } else { String::new() };
+        text += &format!("        {counted}{name}_{}({});\n", entry.name, arguments.join(", "));
     }
     let absolute = if precision == Precision::F32 { "fabsf" } else { "fabs" };
     text += &format!(
         "        for (size_t output = 0U; output < {outputs}U; output += 1U) {{\n            \
-         if (!({absolute}(y[output] - EXPECTED[row][output]) <= TOLERANCE)) {{\n                wrong = 1;\n            }}\n        }}\n    }}\n    \
-         return wrong;\n}}\n"
+         if (!({absolute}(y[output] - EXPECTED[row][output]) <= TOLERANCE)) {{\n                wrong = 1;\n            }}\n        }}\n    }}\n"
     );
+    if misses {
+        text += &format!(
+            "    if ({MISSING} != {}U) {{ // How many numbers of the rows are.\n        wrong = 1;\n    }}\n",
+            vector.missing
+        );
+    }
+    text += "    return wrong;\n}\n";
     ExportedFile { name: format!("{name}_test.c"), text }
 }

@@ -11,8 +11,9 @@ use thetahat_core::nalgebra::DVector;
 
 use super::head::Head;
 use super::program::{Condition, Entry, Index, Kind, Program, Statement, Value, Variable};
-use super::rust::{LINTS, type_name};
+use super::rust::{LINTS, steps_along, type_name};
 use super::signals::levels;
+use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Plan};
 use crate::Error;
@@ -208,4 +209,10 @@ pub(super) fn rust(controller: &Controller, plan: &Plan, head: &Head) -> Exporte
          pub fn applied(&mut self, input: {real}) {{\n        self.controller.applied(input - INPUT_OFFSET);\n    }}\n}}\n"
     );
     ExportedFile { name: format!("{}.rs", plan.name), text }
+}
+
+/// A program that steps that module along a test vector, and panics where an input is wrong.
+pub(super) fn rust_check(plan: &Plan, vector: &Vector) -> ExportedFile {
+    let steps = "        let y = [model.control(SET_POINTS[row][0], MEASURED[row][0])];\n        model.applied(INPUTS[row][0]);\n";
+    steps_along(&plan.name, plan.precision, vector, [".expect(\"a controller\")", steps], false)
 }

@@ -1,6 +1,6 @@
 //! What stands in the comments of an exported file.
 
-use super::{Plan, Precision, Purpose};
+use super::{Language, Plan, Precision, Purpose};
 use crate::control::Control;
 use crate::data::text_digest;
 use crate::model::Signal;
@@ -52,11 +52,15 @@ impl Head {
                 "Where an output is missing (NaN), or a sample that predicts it, nothing is corrected."
                     .to_owned(),
             );
-        } else if !model.inputs().is_empty() {
-            lines.push(
-                "A number that is not finite is missing: an input keeps its value before, the first ones their offset."
-                    .to_owned(),
+        } else {
+            lines.extend(
+                [
+                    "A number that is not finite is missing: an input keeps its value before, the first ones their offset, and an output",
+                    "corrects nothing. Each function gives how many of the numbers that it takes are missing.",
+                ]
+                .map(str::to_owned),
             );
+            lines.extend(finite_math(plan.language));
         }
         lines.push(match plan.precision {
             Precision::F64 => "Compiled without contraction of a * b + c (-ffp-contract=off), its bits are those of the test vector.".to_owned(),
@@ -69,7 +73,7 @@ impl Head {
     ///
     /// # Errors
     /// [`Error::Report`] if the document cannot be written.
-    pub(super) fn of_controller(document: &Control) -> Result<Self, Error> {
+    pub(super) fn of_controller(document: &Control, language: Language) -> Result<Self, Error> {
         let signal = |what: &str, signal: &Signal| {
             format!(
                 "{what} '{}', in its own unit, with the working point {}.",
@@ -77,7 +81,7 @@ impl Head {
                 signal.offset.level
             )
         };
-        let lines = vec![
+        let mut lines = vec![
             format!(
                 "controller, written by thetahat {} of the document with the digest",
                 env!("CARGO_PKG_VERSION")
@@ -90,7 +94,9 @@ impl Head {
             format!("Sample time {} s. It starts at rest at the working point.", document.sample_time),
             signal("It moves", &document.input),
             signal("It holds", &document.output),
+            "Where the set point or the measurement is not finite the input stays as it was.".to_owned(),
         ];
+        lines.extend(finite_math(language));
         Ok(Self { what: "controller".to_owned(), lines })
     }
 
@@ -99,4 +105,10 @@ impl Head {
         let line = |line: &String| if line.is_empty() { "//\n".to_owned() } else { format!("// {line}\n") };
         self.lines.iter().map(line).chain(["\n".to_owned()]).collect()
     }
+}
+
+/// Why C does not compile in some ways.
+fn finite_math(language: Language) -> Option<String> {
+    let why = "With -ffast-math or -ffinite-math-only a compiler takes every number for finite, and misses those: the source refuses them.";
+    (language == Language::C).then(|| why.to_owned())
 }

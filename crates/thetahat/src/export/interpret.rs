@@ -18,6 +18,7 @@ pub(super) struct Machine {
     variables: Vec<f64>,
     counters: Vec<usize>,
     maps: Vec<Arc<Evaluation>>,
+    missed: usize,
 }
 
 /// A map that can be evaluated.
@@ -37,6 +38,7 @@ impl Machine {
             variables: vec![0.0; program.variables.len()],
             counters: vec![0; program.counters],
             maps: program.maps.iter().map(evaluation).collect(),
+            missed: 0,
             precision,
         }
     }
@@ -52,6 +54,18 @@ impl Machine {
         self.execute(&entry.body);
         let result = entry.result.and_then(|array| self.arrays.get(array.0));
         result.map_or(&[], Vec::as_slice)
+    }
+
+    /// How many numbers were missing until now.
+    pub(super) fn missed(&self) -> usize {
+        self.missed
+    }
+
+    /// What stands in an array.
+    #[cfg(test)]
+    pub(super) fn array(&self, program: &Program, name: &str) -> &[f64] {
+        let place = program.arrays.iter().position(|array| array.name == name);
+        place.and_then(|place| self.arrays.get(place)).map_or(&[], Vec::as_slice)
     }
 
     fn execute(&mut self, statements: &[Statement]) {
@@ -78,6 +92,7 @@ impl Machine {
                     };
                     self.execute(if holds { then } else { otherwise });
                 }
+                Statement::Miss => self.missed += 1,
                 Statement::Evaluate { map, into } => self.variables[into.0] = self.evaluate(*map),
             }
         }

@@ -105,10 +105,10 @@ impl Lines {
     }
 
     fn take_inputs(&self, program: &mut Program, signals: &Signals, outputs: usize) -> Vec<Statement> {
-        let inputs = self
-            .each
-            .iter()
-            .filter_map(|(source, scale, line)| Some((source.checked_sub(outputs)?, scale, line)));
+        let inputs = self.each.iter().enumerate().filter_map(|(place, (source, scale, line))| {
+            let is_first = self.each.iter().take(place).all(|(own, ..)| own != source);
+            Some(((source.checked_sub(outputs)?, is_first), scale, line))
+        });
         inputs.flat_map(|(input, scale, line)| signals.take_scaled(program, input, *scale, *line)).collect()
     }
 

@@ -212,7 +212,7 @@ fn predictor(
         Statement::Let(y, signals.output(&0.into())),
         Statement::Choose {
             condition: Condition::Missing(y.into()),
-            then: vec![Statement::Set(y, known.at(1))],
+            then: vec![Statement::Miss, Statement::Set(y, known.at(1))],
             otherwise: Vec::new(),
         },
     ];

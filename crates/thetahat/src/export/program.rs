@@ -36,6 +36,12 @@ impl From<Counter> for Index {
 }
 
 impl Index {
+    /// The place as far from the end of so many places as this one is from their start.
+    pub(super) fn mirrored(self, places: usize) -> Self {
+        let terms = self.terms.into_iter().map(|(counter, factor)| (counter, -factor));
+        Self { constant: places.saturating_sub(self.constant + 1), terms: terms.collect() }
+    }
+
     /// The same so many places on.
     pub(super) fn plus(mut self, places: usize) -> Self {
         self.constant += places;
@@ -57,6 +63,8 @@ pub(super) enum Kind {
     Table,
     /// Numbers that a step leaves to the next one.
     Memory,
+    /// Numbers that a step leaves to who reads them.
+    Told,
     /// What a function is given, or gives.
     Argument,
     Result,
@@ -72,6 +80,13 @@ pub(super) struct Declared {
     /// Of a table that the core reads in groups, how many numbers are one.
     pub(super) group: usize,
     pub(super) doc: String,
+}
+
+impl Declared {
+    /// Whether it stays from one step to the next.
+    pub(super) fn is_kept(&self) -> bool {
+        matches!(self.kind, Kind::Memory | Kind::Told)
+    }
 }
 
 /// The four operations.
@@ -192,6 +207,8 @@ pub(super) enum Statement {
         then: Vec<Statement>,
         otherwise: Vec<Statement>,
     },
+    /// Counts a number that the function was given and takes for missing.
+    Miss,
     /// A variable of which this is the first value: what a map makes of its regressors.
     Evaluate {
         map: usize,
@@ -203,6 +220,20 @@ impl Statement {
     /// What is done unless a number is missing.
     pub(super) fn unless_missing(number: Value, done: Vec<Self>) -> Self {
         Self::Choose { condition: Condition::Missing(number), then: Vec::new(), otherwise: done }
+    }
+
+    /// The same of a number that the function was given, which counts if it is missing.
+    pub(super) fn unless_missed(given: Value, done: Vec<Self>) -> Self {
+        Self::Choose { condition: Condition::Missing(given), then: vec![Self::Miss], otherwise: done }
+    }
+
+    fn misses(&self) -> bool {
+        match self {
+            Self::Miss => true,
+            Self::Repeat { body, .. } => body.iter().any(Self::misses),
+            Self::Choose { then, otherwise, .. } => then.iter().chain(otherwise).any(Self::misses),
+            Self::Let(..) | Self::Set(..) | Self::Store(..) | Self::Evaluate { .. } => false,
+        }
     }
 }
 
@@ -248,6 +279,23 @@ pub(super) struct Entry {
     pub(super) body: Vec<Statement>,
 }
 
+impl Entry {
+    /// Whether it counts the numbers that are missing, and gives how many there are.
+    pub(super) fn misses(&self) -> bool {
+        self.body.iter().any(Statement::misses)
+    }
+
+    /// What is said of it, and of that count.
+    pub(super) fn comments(&self) -> impl Iterator<Item = &str> {
+        let count =
+            "It gives how many of the numbers that it takes are missing, as they are not finite: 0 if none.";
+        self.doc.iter().map(String::as_str).chain(self.misses().then_some(count))
+    }
+}
+
+/// How the count of numbers that are missing is called, so that no variable is.
+pub(super) const MISSING: &str = "missing";
+
 /// A model as it steps.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Program {
@@ -275,6 +323,11 @@ impl Program {
         self.array(Kind::Memory, name, doc, values)
     }
 
+    /// So many numbers that a step leaves to who reads them, 0 at first.
+    pub(super) fn told(&mut self, name: &str, doc: &str, size: usize) -> Array {
+        self.array(Kind::Told, name, doc, vec![0.0; size])
+    }
+
     /// A variable with a name of its own.
     pub(super) fn variable(&mut self, name: &str) -> Variable {
         let is_signal = |array: &&Declared| matches!(array.kind, Kind::Argument | Kind::Result);
@@ -282,7 +335,7 @@ impl Program {
         let taken: Vec<&String> = self.variables.iter().chain(signals).collect();
         let mut own = name.to_owned();
         let mut number = 2;
-        while taken.contains(&&own) {
+        while taken.contains(&&own) || own == MISSING {
             own = format!("{name}_{number}");
             number += 1;
         }

@@ -1,7 +1,7 @@
 //! A program as a module of Rust that needs no heap.
 
 use super::head::Head;
-use super::program::{Array, Basis, Declared, Entry, Field, Kind, Program};
+use super::program::{Array, Basis, Declared, Entry, Field, Kind, MISSING, Program};
 use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
@@ -41,14 +41,15 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
     for (place, map) in program.maps.iter().enumerate() {
         text += &basis(program, place + 1, &map.basis, real);
     }
-    let memories = || program.arrays.iter().filter(|array| array.kind == Kind::Memory);
+    let memories = || program.arrays.iter().filter(|array| array.is_kept());
     text += &format!(
         "\n/// {}, with what one step leaves to the next one.\n#[derive(Clone, Debug)]\npub struct {} {{\n",
         head.what,
         type_name(name)
     );
-    for Declared { name, values, doc, .. } in memories() {
-        text += &format!("    /// {doc}\n    {name}: [{real}; {}],\n", values.len());
+    for Declared { name, values, doc, kind, .. } in memories() {
+        let public = if *kind == Kind::Told { "pub " } else { "" };
+        text += &format!("    /// {doc}\n    {public}{name}: [{real}; {}],\n", values.len());
     }
     text += &format!(
         "}}\n\nimpl {} {{\n    /// At its start.\n    pub const fn new() -> Self {{\n        Self {{\n",
@@ -75,15 +76,21 @@ pub(super) fn file(program: &Program, name: &str, precision: Precision, head: &H
 fn function(program: &Program, entry: &Entry, writer: &mut Writer<'_>) -> String {
     let real = writer.real();
     let mut text = "\n".to_owned();
-    entry.doc.iter().for_each(|line| text += &format!("    /// {line}\n"));
+    entry.comments().for_each(|line| text += &format!("    /// {line}\n"));
     text += &format!("    {} {{\n", signature(program, entry, real));
+    if entry.misses() {
+        text += &format!("        let mut {MISSING}: usize = 0;\n");
+    }
     let result = entry.result.and_then(|Array(array)| program.arrays.get(array));
     if let Some(Declared { name, values, .. }) = result {
         text += &format!("        let mut {name}: [{real}; {}] = [0.0; {}];\n", values.len(), values.len());
     }
     text += &writer.block(&entry.body, "        ");
-    if let Some(Declared { name, .. }) = result {
-        text += &format!("        {name}\n");
+    match (result, entry.misses()) {
+        (Some(result), true) => text += &format!("        ({}, {MISSING})\n", result.name),
+        (Some(result), false) => text += &format!("        {}\n", result.name),
+        (None, true) => text += &format!("        {MISSING}\n"),
+        (None, false) => {}
     }
     text + "    }\n"
 }
@@ -135,7 +142,12 @@ fn signature(program: &Program, entry: &Entry, real: &str) -> String {
     let arguments: Vec<String> =
         given.map(|(name, length)| format!(", {name}: &[{real}; {length}]")).collect();
     let result = entry.result.as_ref().and_then(array);
-    let result = result.map_or_else(String::new, |(_, length)| format!(" -> [{real}; {length}]"));
+    let result = match (result, entry.misses()) {
+        (Some((_, length)), true) => format!(" -> ([{real}; {length}], usize)"),
+        (Some((_, length)), false) => format!(" -> [{real}; {length}]"),
+        (None, true) => " -> usize".to_owned(),
+        (None, false) => String::new(),
+    };
     format!("pub fn {}(&mut self{}){result}", entry.name, arguments.concat())
 }
 
@@ -150,7 +162,33 @@ pub(super) fn type_name(name: &str) -> String {
 
 /// A program that steps along a test vector, and panics where an output is wrong.
 pub(super) fn check(program: &Program, name: &str, precision: Precision, vector: &Vector) -> ExportedFile {
-    let writer = Writer::new(program, Language::Rust, precision);
+    let mut steps = String::new();
+    for entry in &program.entries {
+        let given = entry.arguments.iter().filter_map(|array| program.arrays.get(array.0));
+        let arguments: Vec<String> =
+            given.map(|array| format!("&{}[row]", Vector::table_of(&array.name))).collect();
+        let (result, counted) = match (entry.result, entry.misses()) {
+            (Some(_), true) => ("let (y, count) = ", "        missing += count;\n"),
+            (Some(_), false) => ("let y = ", ""),
+            (None, true) => ("missing += ", ""),
+            (None, false) => ("", ""),
+        };
+        steps += &format!("        {result}model.{}({});\n{counted}", entry.name, arguments.join(", "));
+    }
+    steps_along(name, precision, vector, ["", &steps], program.entries.iter().any(Entry::misses))
+}
+
+/// A program that takes these steps along a test vector, which leave the outputs of a row in `y`, and where they do count numbers that are missing
+/// in `missing`. What `new` gives is the model after `unwrapped`.
+pub(super) fn steps_along(
+    name: &str,
+    precision: Precision,
+    vector: &Vector,
+    [unwrapped, steps]: [&str; 2],
+    misses: bool,
+) -> ExportedFile {
+    let program = Program::default();
+    let writer = Writer::new(&program, Language::Rust, precision);
     let (real, rows, outputs) = (writer.real(), vector.rows(), vector.expected.len());
     let mut text = format!(
         "// Steps {name}.rs along the rows of {name}.csv, and panics if an output is wrong.\n\n{LINTS}\n#[path = \"{name}.rs\"]\nmod {name};\n\n"
@@ -168,23 +206,20 @@ pub(super) fn check(program: &Program, name: &str, precision: Precision, vector:
         }
         text += "];\n";
     }
+    let counted = if misses { format!("    let mut {MISSING}: usize = 0;\n") } else { String::new() };
     text += &format!(
-        "\nfn main() {{\n    let mut model = {name}::{}::new();\n    for row in 0..{rows} {{\n",
+        "\nfn main() {{\n    let mut model = {name}::{}::new(){unwrapped};\n{counted}    for row in 0..{rows} {{\n{steps}",
         type_name(name)
     );
-    for entry in &program.entries {
-        let argument = |Array(array): &Array| {
-            let is_input = program.arrays.get(*array).is_some_and(|array| array.name == "u");
-            format!("&{}[row]", if is_input { "INPUTS" } else { "MEASURED" })
-        };
-        let arguments: Vec<String> = entry.arguments.iter().map(argument).collect();
-        let result = if entry.result.is_some() { "let y = " } else { "" };
-        text += &format!("        {result}model.{}({});\n", entry.name, arguments.join(", "));
-    }
     text += &format!(
         "        for output in 0..{outputs} {{\n            \
          let off = (y[output] - EXPECTED[row][output]).abs();\n            \
-         assert!(off <= TOLERANCE, \"row {{}}, output {{}}: off by {{off}}\", row + 1, output + 1);\n        }}\n    }}\n}}\n"
+         assert!(off <= TOLERANCE, \"row {{}}, output {{}}: off by {{off}}\", row + 1, output + 1);\n        }}\n    }}\n"
     );
+    if misses {
+        text +=
+            &format!("    assert_eq!({MISSING}, {}, \"numbers of the rows are missing\");\n", vector.missing);
+    }
+    text += "}\n";
     ExportedFile { name: format!("{name}_test.rs"), text }
 }

@@ -1,6 +1,6 @@
 //! What goes into a program and comes out of it, in the units of the channels.
 
-use super::program::{Array, Entry, Index, Kind, Program, Statement, Value};
+use super::program::{Array, Entry, Index, Kind, Program, Statement, Value, Variable};
 use crate::Error;
 use crate::model::{Model, Signal};
 
@@ -20,6 +20,61 @@ pub(super) struct Signals {
     pub(super) outputs: Array,
     input_offsets: Option<Array>,
     output_offsets: Option<Array>,
+}
+
+/// What an observer tells of the innovations of its last step, as [`Innovation`](thetahat_core::Innovation) has it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Innovations {
+    pub(super) errors: Array,
+    pub(super) variances: Array,
+    /// The normalised innovation squared.
+    pub(super) nis: Array,
+}
+
+impl Innovations {
+    pub(super) fn new(program: &mut Program, outputs: usize) -> Self {
+        let mut told = |name: &str, doc: &str, size: usize| program.told(name, doc, size);
+        Self {
+            errors: told(
+                "innovation",
+                "Of the last step: the outputs less their predictions; NaN where they are missing.",
+                outputs,
+            ),
+            variances: told(
+                "innovation_variance",
+                if outputs == 1 {
+                    "The variance of that; NaN where it is missing."
+                } else {
+                    "The variance of each of these, given those after it; NaN where they are missing."
+                },
+                outputs,
+            ),
+            nis: told(
+                "nis",
+                "The normalised innovation squared: chi-square distributed, a degree of freedom for each output that is there, if the model is right.",
+                1,
+            ),
+        }
+    }
+
+    /// A step begins.
+    pub(super) fn begin(&self) -> Statement {
+        Statement::Store(self.nis, 0.into(), 0.0.into())
+    }
+
+    /// An output is missing.
+    pub(super) fn miss(&self, place: &Index) -> [Statement; 2] {
+        [self.errors, self.variances].map(|array| Statement::Store(array, place.clone(), f64::NAN.into()))
+    }
+
+    /// The variance of an innovation whose part that those after it do not predict is this.
+    pub(super) fn count(&self, place: &Index, error: Variable, variance: Value) -> [Statement; 2] {
+        let part = Value::from(error) * error / self.variances.at(place.clone());
+        [
+            Statement::Store(self.variances, place.clone(), variance),
+            Statement::Store(self.nis, 0.into(), self.nis.at(0) + part),
+        ]
+    }
 }
 
 /// The offsets of signals.
@@ -74,15 +129,19 @@ impl Signals {
         self.take(program, place, line, |deviation| deviation)
     }
 
-    /// The same of an input divided by its scale.
+    /// The same of an input divided by its scale. Where it was taken before, for another line, it does not count again if it is missing.
     pub(super) fn take_scaled(
         &self,
         program: &mut Program,
-        place: usize,
+        (place, is_first): (usize, bool),
         scale: f64,
         line: Array,
     ) -> Vec<Statement> {
-        self.take(program, place, line, |deviation| deviation / scale)
+        let mut statements = self.take(program, place, line, |deviation| deviation / scale);
+        if let (false, Some(Statement::Choose { then, .. })) = (is_first, statements.last_mut()) {
+            then.clear();
+        }
+        statements
     }
 
     fn take(
@@ -153,5 +212,5 @@ impl Signals {
 
 /// Puts a value into its place, unless what it is made of is missing.
 fn hold(given: Value, into: Array, at: Index, value: Value) -> Statement {
-    Statement::unless_missing(given, vec![Statement::Store(into, at, value)])
+    Statement::unless_missed(given, vec![Statement::Store(into, at, value)])
 }

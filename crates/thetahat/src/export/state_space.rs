@@ -10,8 +10,8 @@
 
 use thetahat_core::nalgebra::DMatrix;
 
-use super::program::{Array, Entry, Index, Kind, Program, Statement, Variable};
-use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};
+use super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value, Variable};
+use super::signals::{FREE_RUN, Innovations, PREDICTION, Signals, UPDATE};
 use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, StateSpace, StateSpaceModel};
@@ -50,7 +50,7 @@ pub(super) fn form(whole: &Model, model: &StateSpaceModel, purpose: Purpose) -> 
     program.entries = match purpose {
         Purpose::Simulator => vec![system.simulator(&mut program, &signals)],
         Purpose::Predictor => system.predictor(&mut program, &signals),
-        _ => vec![system.observer(&mut program, &signals)],
+        _ => vec![system.observer(&mut program, &signals, &matrices.noise_covariance)],
     };
     Ok(Form { program, equations, start: "in the state 0, at rest at the offsets".to_owned() })
 }
@@ -186,11 +186,79 @@ impl System {
         vec![signals.responds("predict", PREDICTION, predict), signals.updates(UPDATE, update)]
     }
 
-    fn observer(&self, program: &mut Program, signals: &Signals) -> Entry {
+    /// What was measured, and the innovations: e, and where their covariance has an inverse their variances and e' S^-1 e, one output after the other,
+    /// the last one first, each less what those after it predict of it (S = U D U', Bierman 1977).
+    fn innovations(
+        &self,
+        program: &mut Program,
+        signals: &Signals,
+        y: Array,
+        covariance: &DMatrix<f64>,
+    ) -> Vec<Statement> {
+        let m = self.outputs;
+        let told = Innovations::new(program, m);
+        let [error, rest, share] = ["error", "rest", "share"].map(|name| program.variable(name));
+        let several = (m > 1).then(|| {
+            let table: Vec<f64> = covariance.transpose().iter().copied().collect();
+            (
+                program.table("S", "The covariance of the innovations, row by row.", table),
+                program.memory("s", "That of what is not predicted yet.", vec![0.0; m * m]),
+                program.memory("rest", "What is not predicted yet of the innovations.", vec![0.0; m]),
+            )
+        });
+        let mut body = vec![told.begin()];
+        if let Some((table, s, _)) = several {
+            body.extend(program.repeat(m * m, |_, i| vec![Statement::Store(s, i.clone(), table.at(i))]));
+        }
+        // Whether the errors are there is known before the first of them is used.
+        body.extend(program.repeat(m, |_, j| {
+            let mut known = vec![
+                Statement::Let(error, signals.output(&j) - y.at(j.clone())),
+                Statement::Store(told.errors, j.clone(), error.into()),
+                Statement::Store(y, j.clone(), signals.output(&j)),
+            ];
+            let mut missed = vec![Statement::Miss];
+            missed.extend(told.miss(&j));
+            match several {
+                None => known.extend(told.count(&j, error, covariance[0].into())),
+                Some((.., left)) => {
+                    known.push(Statement::Store(left, j.clone(), error.into()));
+                    missed.push(Statement::Store(left, j.clone(), 0.0.into()));
+                }
+            }
+            let condition = Condition::Missing(signals.measured.at(j));
+            vec![Statement::Choose { condition, then: missed, otherwise: known }]
+        }));
+        let Some((_, s, left)) = several else { return body };
+        body.extend(program.repeat(m, |program, place| {
+            let j = place.mirrored(m);
+            let mut own = vec![Statement::Let(rest, left.at(j.clone()))];
+            own.extend(told.count(&j, rest, s.at(j.entry(m, &j))));
+            own.extend(program.repeat(m, |program, k| {
+                let mut row = vec![
+                    Statement::Let(share, s.at(k.entry(m, &j)) / told.variances.at(j.clone())),
+                    Statement::Store(left, k.clone(), left.at(k.clone()) - Value::from(share) * rest),
+                ];
+                row.extend(program.repeat(m, |_, l| {
+                    let entry = k.entry(m, &l);
+                    let less = Value::from(share) * s.at(j.entry(m, &l));
+                    vec![Statement::Store(s, entry.clone(), s.at(entry) - less)]
+                }));
+                row
+            }));
+            vec![Statement::unless_missing(signals.measured.at(j), own)]
+        }));
+        body
+    }
+
+    fn observer(&self, program: &mut Program, signals: &Signals, covariance: &DMatrix<f64>) -> Entry {
         let (Some(y), Some(x)) = (self.y, self.x) else { return signals.observes("", None, Vec::new()) };
         let mut body = self.take_inputs(program, signals);
         body.extend(self.outputs(program, |sum, row| vec![Statement::Store(y, row.clone(), sum.into())]));
-        body.extend(self.take_measured(program, signals));
+        body.extend(match covariance.clone().cholesky() {
+            Some(_) => self.innovations(program, signals, y, covariance),
+            None => self.take_measured(program, signals),
+        });
         body.extend(self.go_on(program));
         let state = program.array(Kind::Result, "state", "The state.", vec![0.0; self.states]);
         body.extend(program.repeat(self.states, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));

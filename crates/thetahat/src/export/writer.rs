@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::program::{
-    Condition, Counter, Declared, Function, Index, Kind, Operation, Program, Statement, Value, Variable,
+    Condition, Counter, Function, Index, MISSING, Operation, Program, Statement, Value, Variable,
 };
 use super::{Language, Precision};
 
@@ -41,6 +41,7 @@ impl<'p> Writer<'p> {
 
     /// A number that is read back to the bit: the shortest decimal that is nearest to it.
     pub(super) fn number(&self, value: f64) -> String {
+        let value = self.precision.rounded(value);
         match (self.language, self.precision) {
             (Language::C, _) if value.is_nan() => "NAN".to_owned(),
             (Language::C, _) if value.is_infinite() => {
@@ -139,6 +140,9 @@ impl<'p> Writer<'p> {
                     tail = format!(" else {{\n{}{indent}}}", self.block(otherwise, &inner));
                 }
                 writeln!(text, "{indent}{head} {{\n{body}{indent}}}{tail}")
+            }
+            Statement::Miss => {
+                writeln!(text, "{indent}{MISSING} += 1{};", if c { "U" } else { "" })
             }
             Statement::Evaluate { map, into } => {
                 let (program, name, real) = (self.program, self.name(*into).to_owned(), self.real());
@@ -242,15 +246,13 @@ impl<'p> Writer<'p> {
             Value::Number(number) => self.number(*number),
             Value::Variable(variable) => self.name(*variable).to_owned(),
             Value::At(array, index) => {
-                let Some(Declared { name, kind, .. }) = self.program.arrays.get(array.0) else {
-                    return String::new();
+                let Some(own) = self.program.arrays.get(array.0) else { return String::new() };
+                let of = match (own.is_kept(), self.language) {
+                    (true, Language::C) => "self->",
+                    (true, Language::Rust) => "self.",
+                    (false, _) => "",
                 };
-                let of = match (kind, self.language) {
-                    (Kind::Memory, Language::C) => "self->",
-                    (Kind::Memory, Language::Rust) => "self.",
-                    _ => "",
-                };
-                format!("{of}{name}[{}]", self.index(index))
+                format!("{of}{}[{}]", own.name, self.index(index))
             }
             Value::Negative(value) => format!("-{}", self.nested(value)),
             Value::Binary(operation, one, other) => {
@@ -288,7 +290,7 @@ fn sets(statements: &[Statement], variable: Variable) -> bool {
             Statement::Set(own, _) => *own == variable,
             Statement::Repeat { body, .. } => sets(body, variable),
             Statement::Choose { then, otherwise, .. } => sets(then, variable) || sets(otherwise, variable),
-            Statement::Let(..) | Statement::Store(..) | Statement::Evaluate { .. } => false,
+            Statement::Let(..) | Statement::Store(..) | Statement::Miss | Statement::Evaluate { .. } => false,
         })
 }
 
@@ -308,7 +310,7 @@ fn counts(statements: &[Statement], counter: Counter) -> bool {
             };
             chosen || counts(then, counter) || counts(otherwise, counter)
         }
-        Statement::Evaluate { .. } => false,
+        Statement::Miss | Statement::Evaluate { .. } => false,
     })
 }
 

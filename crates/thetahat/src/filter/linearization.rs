@@ -84,11 +84,11 @@ impl Transition<f64, Dyn, Dyn> for Linearization {
         self.values.clone()
     }
 
-    fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+    fn next_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
         self.jacobian.clone()
     }
 
-    fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn process_noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
         self.noise.clone()
     }
 }
@@ -98,11 +98,11 @@ impl Observation<f64, Dyn, Dyn, Dyn> for Linearization {
         self.values.clone()
     }
 
-    fn jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+    fn output_jacobian(&self, _: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
         self.jacobian.clone()
     }
 
-    fn noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+    fn measurement_noise(&self, _: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
         self.noise.clone()
     }
 }

@@ -45,21 +45,22 @@ impl Estimator {
             let scalings: Vec<Scaling<f64>> = input_scales.iter().map(scaling).collect();
             let estimator = RecursiveNarx::new(functions, &orders, scaling(output), &scalings, forgetting)?;
             let estimator = estimator.with_start(plan.start.0)?.with_dead_zone(plan.dead_zone)?;
-            return Ok(Self::Narx(estimator));
+            return Ok(Self::Narx(estimator.with_outliers(plan.outliers.0)?));
         }
         match plan.method.with_noise_model() {
             None => {
                 let orders = ArxOrders { na, inputs: &inputs, constant };
                 let estimator = RecursiveArx::new(&orders, *output, input_scales, forgetting)?;
                 let estimator = estimator.with_start(plan.start.0)?.with_dead_zone(plan.dead_zone)?;
-                Ok(Self::Arx(estimator))
+                Ok(Self::Arx(estimator.with_outliers(plan.outliers.0)?))
             }
             Some(method) => {
                 let noise = plan.noise_scale.unwrap_or(output / 10.0);
                 let orders = ArmaxOrders { na, inputs: &inputs, nc, constant };
                 let estimator =
                     RecursiveArmax::new(&orders, method, *output, input_scales, noise, forgetting)?;
-                Ok(Self::Armax(estimator.with_dead_zone(plan.dead_zone)?))
+                let estimator = estimator.with_dead_zone(plan.dead_zone)?;
+                Ok(Self::Armax(estimator.with_outliers(plan.outliers.0)?))
             }
         }
     }

@@ -1,5 +1,5 @@
 use serde::{Deserialize, Serialize};
-use thetahat_core::{ArmaxMethod, Forgetting, RlsStart};
+use thetahat_core::{ArmaxMethod, Forgetting, Outliers, RlsStart};
 
 /// How a model is tracked.
 ///
@@ -20,6 +20,8 @@ pub struct TrackPlan {
     pub start: TrackStart,
     /// An innovation of at most this size corrects nothing, in the output's units. 0: no dead zone.
     pub dead_zone: f64,
+    /// What becomes of samples whose innovations are far larger than the noise makes them.
+    pub outliers: TrackOutliers,
     /// Whether a constant is estimated beside the model: A y = B u + constant + C e, for signals whose offsets are not known.
     pub constant: bool,
     /// What is taken from each channel before, in its own units, and put back in predictions. None: what the report says;
@@ -46,6 +48,7 @@ impl Default for TrackPlan {
             forgetting: Policy::default(),
             start: TrackStart::default(),
             dead_zone: 0.0,
+            outliers: TrackOutliers::default(),
             constant: false,
             offsets: None,
             scales: None,
@@ -125,3 +128,18 @@ impl Default for TrackStart {
         Self(RlsStart::Standard)
     }
 }
+
+/// What becomes of outliers, written as a word: `used`, `huber` or `huber:THRESHOLD` in standard deviations, `gate`, `gate:NIS` or
+/// `gate:NIS:RELEASE`. Alone `huber` is `huber:3`, `gate` is `gate:25:20` and `gate:NIS` is released after 20 in a row. See
+/// [`Outliers`].
+///
+/// ```
+/// use thetahat::thetahat_core::Outliers;
+/// use thetahat::track::TrackOutliers;
+///
+/// assert_eq!("huber".parse::<TrackOutliers>()?.0, Outliers::Huber { threshold: 3.0 });
+/// assert_eq!("gate:16".parse::<TrackOutliers>()?.to_string(), "gate:16.0:20");
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct TrackOutliers(pub Outliers<f64>);

@@ -377,7 +377,7 @@ impl Tracker {
         estimator.predict(lines, &self.inputs, &mut predicted);
         let [mut predicted] = predicted;
         let innovation = estimator.log_row(output, &self.inputs).map_err(sample_refused)?;
-        let Innovation { mut error, mut variance, mut nis, action } = innovation;
+        let Innovation { mut error, mut variance, mut nis, action, .. } = innovation;
         let excitation = estimator.least_squares().excitation();
         if !self.has_estimate {
             // What the prior says of a sample is no prediction.
@@ -622,7 +622,10 @@ pub(super) fn check_steps(steps: usize) -> Result<(), Error> {
 
 /// Whether the sample corrected an estimate, so that there is one.
 fn corrects(action: Action) -> bool {
-    matches!(action, Action::Updated | Action::Capped | Action::Projected)
+    matches!(
+        action,
+        Action::Updated | Action::Capped | Action::Projected | Action::Bounded | Action::Released
+    )
 }
 
 /// What the estimator does not take as a sample.

@@ -4,9 +4,9 @@ use std::fmt;
 use std::iter;
 use std::str::FromStr;
 
-use thetahat_core::{Forgetting, RlsStart};
+use thetahat_core::{Forgetting, Outliers, RlsStart};
 
-use super::plan::{Policy, TrackMethod, TrackStart};
+use super::plan::{Policy, TrackMethod, TrackOutliers, TrackStart};
 use crate::Error;
 
 impl FromStr for TrackMethod {
@@ -129,6 +129,45 @@ impl fmt::Display for TrackStart {
             RlsStart::Exact => f.write_str("exact"),
             RlsStart::Mixed { blend: 0 } => f.write_str("mixed"),
             RlsStart::Mixed { blend } => write!(f, "mixed:{blend}"),
+        }
+    }
+}
+
+impl FromStr for TrackOutliers {
+    type Err = Error;
+
+    /// # Errors
+    /// [`Error::Argument`] if it is none of them, a number is less than 1 or huge, or RELEASE is not in 0 … 65535.
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let threshold = |text: &str| text.parse().ok().filter(|number| (1.0..=1e6).contains(number));
+        let parts: Vec<&str> = text.split(':').collect();
+        let rule = match parts[..] {
+            ["used"] => Some(Outliers::Used),
+            ["huber"] => Some(Outliers::Huber { threshold: 3.0 }),
+            ["huber", number] => threshold(number).map(|threshold| Outliers::Huber { threshold }),
+            ["gate"] => Some(Outliers::Gate { nis: 25.0, release: 20 }),
+            ["gate", number] => threshold(number).map(|nis| Outliers::Gate { nis, release: 20 }),
+            ["gate", number, release] => threshold(number)
+                .zip(release.parse().ok())
+                .map(|(nis, release)| Outliers::Gate { nis, release }),
+            _ => None,
+        };
+        rule.map(Self).ok_or_else(|| {
+            let message = format!(
+                "'{text}' is no rule; write used, huber:THRESHOLD or gate:NIS:RELEASE, with THRESHOLD and NIS from 1 to 1e6 and RELEASE from 0 to 65535"
+            );
+            Error::argument("outliers", message)
+        })
+    }
+}
+
+/// As it is read.
+impl fmt::Display for TrackOutliers {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Outliers::Huber { threshold } => write!(f, "huber:{threshold:?}"),
+            Outliers::Gate { nis, release } => write!(f, "gate:{nis:?}:{release}"),
+            _ => f.write_str("used"),
         }
     }
 }

@@ -172,8 +172,8 @@ impl Simulation {
         let times = [closed_loop_time, theta, ti, 2.0 * filter];
         let short = times.into_iter().filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
         let wanted = (short / FINE).max(length / MOST_STEPS);
-        let delay = (theta / wanted).ceil();
-        // The dead time is a whole number of steps.
+        // The dead time is a whole number of steps, none if it is less than half of one: it must not make them shorter and shorter.
+        let delay = if theta < 0.5 * wanted { 0.0 } else { (theta / wanted).ceil() };
         let step = if delay > 0.0 { theta / delay } else { wanted };
         let chain = structure.chain(&parts.shape);
         let transition = chain.transition(step);
@@ -183,7 +183,8 @@ impl Simulation {
         let setpoint = if of_setpoint { 1.0 } else { 0.0 };
         let (mut integral, mut slow, mut before) = (0.0, 0.0, None);
         let decay = if filter > 0.0 { 1.0 - (-step / filter).exp() } else { 1.0 };
-        let count = (length / step).ceil() as usize + 1;
+        // Times near the end of the range have no ratio.
+        let count = (length / step).ceil().min(2.0 * MOST_STEPS) as usize + 1;
         let (mut output, mut moved) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for _ in 0..count {
             let y = weight * chain.columns(&state, 0.0)[0];

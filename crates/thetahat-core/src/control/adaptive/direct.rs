@@ -3,12 +3,12 @@
 use nalgebra::{Const, OVector};
 
 use super::closed_loop::ClosedLoop;
-use super::{ResponseWanted, TunerSettings, TunerState};
+use super::{Distrust, Fallback, ResponseWanted, TunerSettings, TunerState};
 use crate::arx::is_large;
 use crate::ud::dot;
 use crate::{
-    ArxOrders, Dimension, Error, Forgetting, InputOrders, Lags, Real, RecursiveLeastSquares, RlsStart,
-    RstController,
+    Action, ArxOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
+    RecursiveLeastSquares, RlsStart, RstController,
 };
 
 /// How large a [`DirectSelfTuner`] is.
@@ -71,10 +71,11 @@ impl DirectOrders {
 /// Two ways to adapt: recursive least squares, or the normalised gradient of model-reference adaptive control
 /// ([`with_gradient`](DirectSelfTuner::with_gradient)), which is cheap, bounded without forgetting, and slow.
 ///
-/// `P`, `N` and `D` are [`DirectOrders::parameters`], [`size`](DirectOrders::size) and [`delays`](DirectOrders::delays). Of
-/// [`TunerSettings`] all is used; the sign is that of r_0 = b_0. [`Sensor`](crate::Sensor) and [`Probing`](crate::Probing) as there. The first
-/// controller waits until r_0 is known to five standard errors; later ones are taken while r_0 has its sign and not less than a
-/// twentieth of its size when it was known best.
+/// `P`, `N` and `D` are [`DirectOrders::parameters`], [`size`](DirectOrders::size) and
+/// [`delays`](DirectOrders::delays). Of [`TunerSettings`] all is used; the sign is that of r_0 = b_0.
+/// [`Sensor`](crate::Sensor) and [`Probing`](crate::Probing) as there, and [`Supervision`](crate::Supervision): where
+/// it is not trusted a fallback acts. The first controller waits until r_0 is known to five standard errors; later ones
+/// are taken while r_0 has its sign and not less than a twentieth of its size when it was known best.
 ///
 /// Source: Åström and Wittenmark, Adaptive Control, 2nd ed. 1995, sections 3.5, 4.3 and 5.3 (the gradient).
 ///
@@ -139,13 +140,15 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>> Adaptation<T, P> {
         }
     }
 
-    /// Learns from a sample, if it is one that can be.
-    fn learn(&mut self, regressor: &[T], output: T) {
+    /// Learns from a sample, if it is one that can be. What it told.
+    fn learn(&mut self, regressor: &[T], output: T) -> Option<Innovation<T>> {
         match self {
             Adaptation::LeastSquares(estimator) => {
-                if estimator.take(regressor, output).is_err() {
+                let told = estimator.take(regressor, output).ok();
+                if told.is_none() {
                     estimator.advance();
                 }
+                told
             }
             Adaptation::Gradient { parameters, weights, gain } => {
                 let error = output - dot(regressor, parameters.as_slice());
@@ -158,15 +161,18 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>> Adaptation<T, P> {
                         *parameter += step * *weight * *value;
                     }
                 }
+                None
             }
         }
     }
 
-    /// The variance of the first parameter, where there is one.
-    fn variance(&self) -> Option<T> {
+    /// Whether the first parameter exceeds five of its standard errors, where there are any.
+    fn knows_gain(&self) -> Option<bool> {
         match self {
             Adaptation::LeastSquares(estimator) => {
-                estimator.parameter_covariance()?.variances().as_slice().first().copied()
+                let (gain, covariance) = (*self.parameters().first()?, estimator.parameter_covariance());
+                let variance = covariance.and_then(|found| found.variances().as_slice().first().copied());
+                Some(variance.is_some_and(|variance| gain * gain > T::from_count(25) * variance))
             }
             Adaptation::Gradient { .. } => None,
         }
@@ -193,7 +199,7 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         }
         let (needed, of_r) = (orders.size(), orders.of_r());
         let size = N::exactly(needed).map_err(|available| Error::Orders { needed, available })?;
-        let closed = ClosedLoop::new(size, settings)?;
+        let closed = ClosedLoop::new(size, settings, output_scale, delay)?;
         let inputs = [InputOrders { nb: of_r, nk: delay }, InputOrders { nb: na, nk: delay }];
         let lags: Lags<T, P, D> = Lags::new(&ArxOrders { na: 0, inputs: &inputs, constant })?;
         // A signal that stays leaves the filter as large as this.
@@ -275,8 +281,24 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         let measurement = if self.is_too_large(measurement) { T::NAN } else { measurement };
         let reading = self.closed.read(measurement, predicted);
         let learns = reading.learns && self.closed.adapting;
-        if let (Some(regressor), Some(output)) = (regressor, reading.output.filter(|_| learns)) {
-            self.adaptation.learn(regressor.as_slice(), output);
+        match reading.output.filter(|_| !reading.predicted) {
+            Some(output) => {
+                let told = regressor
+                    .filter(|_| learns)
+                    .and_then(|regressor| self.adaptation.learn(regressor.as_slice(), output));
+                let innovation = told.unwrap_or(Innovation {
+                    error: output - predicted,
+                    variance: T::NAN,
+                    nis: T::zero(),
+                    action: match regressor {
+                        None => Action::NotReady,
+                        Some(_) if learns => Action::Updated,
+                        Some(_) => Action::Frozen,
+                    },
+                });
+                self.closed.supervisor.learnt(innovation, output, reading.learns);
+            }
+            None => self.closed.supervisor.missed(),
         }
         // Where nothing is known the output is as it was: a hole in this filter would never close.
         self.output = reading.output.unwrap_or(self.output);
@@ -288,7 +310,10 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         if self.closed.controller.is_none() || learns {
             self.redesign();
         }
-        self.closed.act(set_point - self.constant(), &reading, output)
+        let (adaptation, offset) = (&self.adaptation, self.constant());
+        // Without standard errors a design that was accepted is all that is known.
+        self.closed
+            .act(set_point - offset, offset, &reading, output, || adaptation.knows_gain().unwrap_or(true))
     }
 
     /// Tells that the actuator did something else than the latest [`control`](DirectSelfTuner::control) asked for. A number that
@@ -315,6 +340,41 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
     /// What it did in the latest sample.
     pub fn state(&self) -> TunerState {
         self.closed.state
+    }
+
+    /// Says that the gain has this sign from now on, or 0 that it is not known.
+    ///
+    /// Errors: [`Error::OutOfRange`] if it is not finite.
+    pub fn set_gain_sign(&mut self, sign: T) -> Result<(), Error> {
+        self.closed.set_gain_sign(sign)
+    }
+
+    /// What acts from now on while the tuner is not trusted.
+    ///
+    /// Errors: [`Error::OutOfRange`] if it is an input that is not finite.
+    pub fn set_fallback(&mut self, fallback: Fallback<T>) -> Result<(), Error> {
+        self.closed.set_fallback(fallback)
+    }
+
+    /// Trusts the tuner from now on: the controller acts, or the plant is excited until there is one. What
+    /// [`Supervision`](crate::Supervision) looks at begins anew.
+    pub fn trust(&mut self) {
+        self.closed.trust();
+    }
+
+    /// Why it is not trusted; `None` if it is.
+    pub fn distrust(&self) -> Option<Distrust> {
+        self.closed.supervisor.distrust
+    }
+
+    /// What the latest measurement told the model.
+    pub fn innovation(&self) -> Innovation<T> {
+        self.closed.supervisor.innovation()
+    }
+
+    /// The samples since the latest design that was accepted, or since the start: 0 if that was in the latest sample.
+    pub fn design_age(&self) -> u32 {
+        self.closed.supervisor.age()
     }
 
     /// The coefficients of R, then those of S, then the constant, as they are estimated.
@@ -347,19 +407,24 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         let parameters = self.adaptation.parameters();
         let Some((gain, _)) = parameters.split_first() else { return };
         let gain = *gain;
-        let knows =
-            || self.adaptation.variance().is_some_and(|variance| gain * gain > T::from_count(25) * variance);
-        if self.closed.waits(knows) || !parameters.iter().all(T::is_finite) {
+        let knows = || self.adaptation.knows_gain() == Some(true);
+        if self.closed.waits(knows) {
             return;
         }
+        if !parameters.iter().all(T::is_finite) || gain.is_zero() {
+            return self.closed.supervisor.refuse(Distrust::Age, 1);
+        }
         // r_0 divides all others. What is not known may not have another sign, nor be far smaller.
-        if gain.is_zero() || gain * self.closed.settings.gain_sign < T::zero() {
-            return;
+        if gain * self.closed.settings.gain_sign < T::zero() {
+            let samples = if self.adaptation.knows_gain().unwrap_or(true) { 4 } else { 1 };
+            return self.closed.supervisor.refuse(Distrust::Sign, samples);
         }
         if self.known.is_zero() || knows() {
             self.known = gain;
-        } else if gain * self.known < T::zero() || gain.abs() * T::from_count(20) < self.known.abs() {
-            return;
+        } else if gain * self.known < T::zero() {
+            return self.closed.supervisor.refuse(Distrust::Sign, 1);
+        } else if gain.abs() * T::from_count(20) < self.known.abs() {
+            return self.closed.supervisor.refuse(Distrust::Age, 1);
         }
         let size = self.closed.size();
         let (mut r, mut s, mut observer) =
@@ -376,8 +441,12 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         let response = self.closed.settings.response.response();
         let ahead = response.iter().fold(T::zero(), |sum, value| sum + *value) / gain;
         // Numbers out of range: the last one goes on.
-        let _ =
-            RstController::new(ahead, r, s, observer).and_then(|controller| self.closed.install(controller));
+        if RstController::new(ahead, r, s, observer)
+            .and_then(|controller| self.closed.install(controller))
+            .is_err()
+        {
+            self.closed.supervisor.refuse(Distrust::Age, 1);
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use super::{Probing, ResponseWanted, Sensor};
+use super::{Distrust, Probing, ResponseWanted, Sensor, Supervision};
 use crate::{Error, Real};
 
 /// What a self-tuner is asked for.
@@ -25,21 +25,25 @@ pub struct TunerSettings<T> {
     pub probing: Probing<T>,
     /// The sensor.
     pub sensor: Sensor<T>,
+    /// When it is not trusted, and what acts then.
+    pub supervision: Supervision<T>,
 }
 
 impl<T: Real> TunerSettings<T> {
-    /// Settings for this response, this range of the actuator and this usual size of inputs: from the input 0, or the nearest end of
-    /// the range, with nothing known of the gain, and [`Probing::of_scale`].
+    /// Settings for this response, this range of the actuator and this usual size of inputs: from the input 0, or the
+    /// nearest end of the range, with nothing known of the gain, [`Probing::of_scale`] and [`Supervision::of_scale`].
     pub fn new(response: ResponseWanted<T>, limits: RangeInclusive<T>, input_scale: T) -> Self {
         let input = T::zero().max(*limits.start()).min(*limits.end());
         let (probing, sensor) = (Probing::of_scale(input_scale), Sensor::default());
-        TunerSettings { response, limits, input, gain_sign: T::zero(), probing, sensor }
+        let supervision = Supervision::of_scale(input_scale);
+        TunerSettings { response, limits, input, gain_sign: T::zero(), probing, sensor, supervision }
     }
 
     pub(super) fn check(&self) -> Result<(), Error> {
         self.response.check()?;
         self.probing.check()?;
         self.sensor.check()?;
+        self.supervision.check()?;
         let limits = &self.limits;
         let ranges = [
             ("limits", !limits.is_empty(), "in order, the lower one first"),
@@ -68,4 +72,7 @@ pub enum TunerState {
     Bridging,
     /// The sensor says nothing for long, or what it said is too little to predict from: the input stays as it was.
     Holding,
+    /// It is not trusted: the fallback of [`Supervision`] acts, whether the sensor says anything or not, and the model
+    /// goes on learning. Where the design is only old the controller acts.
+    Distrusted(Distrust),
 }

@@ -1,10 +1,12 @@
 extern crate std;
 
 mod faults;
+mod forgetting;
 mod motor;
 mod noise;
 mod plants;
 mod refusals;
+mod trust;
 
 use std::vec;
 use std::vec::Vec;

@@ -22,7 +22,7 @@ fn silence_is_capped_and_shows_in_the_excitation() {
         capped += usize::from(innovation.action == Action::Capped);
         check_sound(&estimator, true);
     }
-    // It takes some 1000 samples to forget; then there is a cap in each.
+    // It takes some 1000 samples to forget; then all columns of U are held.
     assert!(capped > 18_500, "{capped}");
     assert_eq!(estimator.excitation(), 0.0);
     assert_eq!(estimator.parameters(), &known);

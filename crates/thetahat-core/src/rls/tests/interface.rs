@@ -450,9 +450,10 @@ fn a_copy_in_another_size_goes_on_with_its_policy_and_start() {
 
 #[test]
 fn it_is_small() {
-    // On a microcontroller 4, 8 and 16 parameters take 140, 364 and 1196 bytes; here the pointer is a longer word.
+    // On a microcontroller 4, 8 and 16 parameters take 176, 420 and 1292 bytes; here the pointer is a longer word,
+    // to which all is aligned.
     let word = size_of::<usize>() - 4;
-    assert!(size_of::<Estimator<f32, 4>>() <= 140 + word);
-    assert!(size_of::<Estimator<f32, 8>>() <= 364 + word);
-    assert!(size_of::<Estimator<f32, 16>>() <= 1196 + word);
+    assert!(size_of::<Estimator<f32, 4>>() <= 176 + 2 * word);
+    assert!(size_of::<Estimator<f32, 8>>() <= 420 + 2 * word);
+    assert!(size_of::<Estimator<f32, 16>>() <= 1292 + 2 * word);
 }

@@ -5,11 +5,12 @@
 //! x <- f(x, u),      P <- M P M' + Q
 //! ```
 //!
-//! around one linearisation a sample, with noises that are independent of one another. The covariance is in the form of Bucy and Joseph (Filtering for
+//! around one linearisation a sample, with noises that are independent of one another, the last output first, as the filters of thetahat-core have
+//! it. The covariance is in the form of Bucy and Joseph (Filtering for
 //! Stochastic Processes, 1968), which rounding leaves positive.
 
-use super::super::program::{Array, Entry, Index, Kind, Program, Statement, Value};
-use super::super::signals::{PREDICTION, Signals};
+use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
+use super::super::signals::{Innovations, PREDICTION, Signals};
 use super::{Run, multiplied};
 use crate::model::equations::GreyBox;
 
@@ -73,16 +74,24 @@ impl<'e> Kalman<'e> {
     }
 
     /// Corrects the state by each output that was measured.
-    fn corrected(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
+    fn corrected(
+        &self,
+        program: &mut Program,
+        signals: &Signals,
+        told: Option<Innovations>,
+    ) -> Vec<Statement> {
         let Self { run, p, work, said, h, gain, moved, r, .. } = *self;
         let (n, x) = (run.states, run.x);
         let mut body = program.repeat(n, |_, i| vec![Statement::Store(moved, i, 0.0.into())]);
         let [error, variance, sum, share] =
             ["error", "variance", "total", "share"].map(|name| program.variable(name));
-        body.extend(program.repeat(run.outputs, |program, j| {
+        body.extend(told.map(|told| told.begin()));
+        body.extend(program.repeat(run.outputs, |program, place| {
+            let j = place.mirrored(run.outputs);
             let measured = signals.output(&j) - said.at(j.clone());
             let of_h = |i: &Index| h.at(j.entry(n, i));
             let mut own = vec![Statement::Let(error, measured)];
+            own.extend(told.map(|told| Statement::Store(told.errors, j.clone(), error.into())));
             own.extend(program.repeat(n, |_, i| vec![Statement::Set(error, error - of_h(&i) * moved.at(i))]));
             own.extend(program.repeat(n, |program, i| {
                 let mut row = vec![Statement::Let(sum, 0.0.into())];
@@ -97,6 +106,7 @@ impl<'e> Kalman<'e> {
             own.extend(
                 program.repeat(n, |_, i| vec![Statement::Set(variance, variance + of_h(&i) * gain.at(i))]),
             );
+            own.extend(told.map(|told| told.count(&j, error, variance.into())).into_iter().flatten());
             // (I - K H) P
             own.extend(program.repeat(n, |program, i| {
                 program.repeat(n, |_, k| {
@@ -122,7 +132,10 @@ impl<'e> Kalman<'e> {
                 }));
                 row
             }));
-            vec![Statement::unless_missing(signals.measured.at(j.clone()), own)]
+            let mut missed = vec![Statement::Miss];
+            missed.extend(told.map(|told| told.miss(&j)).into_iter().flatten());
+            let condition = Condition::Missing(signals.measured.at(j));
+            vec![Statement::Choose { condition, then: missed, otherwise: own }]
         }));
         body.extend(
             program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), x.at(i.clone()) + moved.at(i))]),
@@ -159,7 +172,7 @@ impl<'e> Kalman<'e> {
         let mut predict = self.predicted(program, signals);
         predict
             .extend(program.repeat(self.run.outputs, |_, j| vec![signals.say(&j, self.said.at(j.clone()))]));
-        let mut update = self.corrected(program, signals);
+        let mut update = self.corrected(program, signals, None);
         update.extend(self.advanced(program));
         let doc =
             "What was measured in this sample, after its prediction. What is missing (NaN) corrects nothing.";
@@ -169,7 +182,8 @@ impl<'e> Kalman<'e> {
     pub(super) fn observer(&self, program: &mut Program, signals: &Signals) -> Entry {
         let (n, x) = (self.run.states, self.run.x);
         let mut body = self.predicted(program, signals);
-        body.extend(self.corrected(program, signals));
+        let told = Innovations::new(program, self.run.outputs);
+        body.extend(self.corrected(program, signals, Some(told)));
         let state = program.array(Kind::Result, "state", "The state.", vec![0.0; n]);
         body.extend(program.repeat(n, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));
         body.extend(self.advanced(program));

@@ -119,13 +119,13 @@ impl ParametricTransition<f64, Dyn, Dyn, Dyn> for Parametric<'_> {
     fn next(&self, x: &Vector, z: &Vector, u: &Vector) -> Vector {
         self.step(x, z, u).0
     }
-    fn state_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
+    fn next_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
         self.step(x, z, u).1.columns(0, x.len()).into_owned()
     }
-    fn parameter_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
+    fn next_parameter_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
         self.step(x, z, u).1.columns(x.len(), z.len()).into_owned()
     }
-    fn noise(&self, x: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
+    fn process_noise(&self, x: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
         let variances = self.0.process_variances(self.0.sample_time());
         Covariance::from_diagonal(&Vector::from_iterator(x.len(), variances)).unwrap()
     }
@@ -135,13 +135,13 @@ impl ParametricObservation<f64, Dyn, Dyn, Dyn, Dyn> for Parametric<'_> {
     fn output(&self, x: &Vector, z: &Vector, u: &Vector) -> Vector {
         self.seen(x, z, u).0
     }
-    fn state_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
+    fn output_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
         self.seen(x, z, u).1.columns(0, x.len()).into_owned()
     }
-    fn parameter_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
+    fn output_parameter_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
         self.seen(x, z, u).1.columns(x.len(), z.len()).into_owned()
     }
-    fn noise(&self, _: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
+    fn measurement_noise(&self, _: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
         Covariance::from_diagonal(&Vector::from_column_slice(self.0.measurement_variances())).unwrap()
     }
 }

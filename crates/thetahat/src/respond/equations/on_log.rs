@@ -134,9 +134,25 @@ impl<'l> EquationsOnLog<'l> {
         signals
     }
 
-    fn responses(&self, signals: Vec<Vec<f64>>) -> Vec<Response> {
-        let each = signals.into_iter().zip(&self.counted);
-        each.map(|(values, counted)| Response { values, counted: counted.clone() }).collect()
+    /// The rows that count so many steps ahead, for each output: those that a measurement stands as many rows before. The others are predicted
+    /// from the state that the model begins with, which is no prediction from data. An output of which no other row is left keeps them.
+    fn predicted_from_measurements(&self, steps: usize) -> Vec<Vec<Range<usize>>> {
+        let first = |experiment: &Experiment| -> Option<(Range<usize>, usize)> {
+            let is_measured = |row: &usize| experiment.output(*row).iter().any(|value| !value.is_nan());
+            let measured = (0..experiment.rows()).find(is_measured)?;
+            let own = experiment.first..experiment.first + experiment.rows();
+            Some((own, experiment.first + measured + steps))
+        };
+        let first: Vec<(Range<usize>, usize)> = self.experiments.iter().filter_map(first).collect();
+        let later = |rows: &Range<usize>| {
+            let (_, first) = first.iter().find(|(own, _)| own.contains(&rows.start))?;
+            Some(rows.start.max(*first)..rows.end).filter(|rows| !rows.is_empty())
+        };
+        let of_output = |counted: &Vec<Range<usize>>| {
+            let left: Vec<Range<usize>> = counted.iter().filter_map(later).collect();
+            if left.is_empty() { counted.clone() } else { left }
+        };
+        self.counted.iter().map(of_output).collect()
     }
 
     /// The predictions of each experiment, `steps` ahead.
@@ -215,6 +231,11 @@ impl<'l> EquationsOnLog<'l> {
     }
 }
 
+fn responses(signals: Vec<Vec<f64>>, counted: Vec<Vec<Range<usize>>>) -> Vec<Response> {
+    let each = signals.into_iter().zip(counted);
+    each.map(|(values, counted)| Response { values, counted }).collect()
+}
+
 /// The rows of a log that count in an experiment.
 fn segments(experiment: &Experiment) -> impl Iterator<Item = Range<usize>> {
     let first = experiment.first;
@@ -249,7 +270,8 @@ impl OnLog for EquationsOnLog<'_> {
         match horizon {
             Horizon::Steps { steps } => {
                 let said = self.ahead(steps)?;
-                Ok(self.responses(self.spread_out(&said, |one| one.value)))
+                let signals = self.spread_out(&said, |one| one.value);
+                Ok(responses(signals, self.predicted_from_measurements(steps)))
             }
             Horizon::FreeRun => {
                 let begin = if start == InitialCondition::Zero {
@@ -268,7 +290,7 @@ impl OnLog for EquationsOnLog<'_> {
                         }
                     }
                 }
-                Ok(self.responses(signals))
+                Ok(responses(signals, self.counted.clone()))
             }
         }
     }

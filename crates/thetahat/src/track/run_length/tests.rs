@@ -59,7 +59,7 @@ fn alarms(detector: &mut ChangeDetector<f64>, samples: usize) -> [f64; 3] {
     let (mut noise, mut alarms) = (Noise(5), [0.0; 3]);
     for _ in 0..samples {
         let error = gaussian(&mut noise);
-        let innovation = Innovation { error, variance: 1.0, nis: error * error, action: Action::Updated };
+        let innovation = Innovation::new(error, 1.0, error * error, Action::Updated);
         let alarm = detector.update(&innovation);
         alarms[0] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::MeanUp)));
         alarms[1] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::MeanDown)));

@@ -21,6 +21,17 @@ fn what_is_written_is_read_back() {
     {
         assert_eq!(TrackStart(start).to_string().parse::<TrackStart>(), Ok(TrackStart(start)));
     }
+    for (text, written) in [
+        ("used", "used"),
+        ("huber", "huber:3.0"),
+        ("huber:2.5", "huber:2.5"),
+        ("gate", "gate:25.0:20"),
+        ("gate:16:0", "gate:16.0:0"),
+    ] {
+        let rule = text.parse::<TrackOutliers>().unwrap();
+        assert_eq!(rule.to_string(), written);
+        assert_eq!(written.parse::<TrackOutliers>(), Ok(rule));
+    }
     for method in [TrackMethod::Rls, TrackMethod::Els, TrackMethod::Rpem] {
         assert_eq!(method.to_string().parse::<TrackMethod>(), Ok(method));
     }
@@ -54,6 +65,19 @@ fn words_that_mean_nothing_are_refused() {
     }
     for text in ["", "exact:1", "mixed:", "mixed:-1", "mixed:65536", "Standard"] {
         assert!(text.parse::<TrackStart>().is_err(), "{text}");
+    }
+    for text in [
+        "",
+        "used:1",
+        "huber:0.5",
+        "huber:nan",
+        "huber:3:1",
+        "gate:25:65536",
+        "gate:25:-1",
+        "gate:1e300",
+        "Gate",
+    ] {
+        assert!(text.parse::<TrackOutliers>().is_err(), "{text}");
     }
     assert!("arx".parse::<TrackMethod>().is_err());
 }

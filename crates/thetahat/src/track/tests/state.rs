@@ -32,6 +32,7 @@ fn what_is_written_goes_on_to_the_bit() {
     let (orders, mut plan) = plans[1].clone();
     plan.constant = true;
     plan.dead_zone = 0.1;
+    plan.outliers = "huber:1".parse().unwrap();
     plan.offsets = Some(PerChannel { inputs: vec![0.1, 0.2], output: 0.3 });
     plan.scales = Some(PerChannel { inputs: vec![3.0, 1.0], output: 9.0 });
     plans.push((orders, plan));

@@ -2,8 +2,8 @@ use nalgebra::Const;
 
 use super::{Tuner, WANTED, settings, tuner};
 use crate::{
-    DirectOrders, DirectSelfTuner, Error, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
-    ResponseWanted, Sensor, TunerOrders, TunerSettings,
+    DirectOrders, DirectSelfTuner, Error, Fallback, Forgetting, IndirectSelfTuner, Probing, RecursiveArmax,
+    ResponseWanted, Sensor, Supervision, TunerOrders, TunerSettings,
 };
 
 fn refused<V>(result: Result<V, Error>, name: &str) -> bool {
@@ -15,6 +15,8 @@ fn settings_out_of_their_range_are_refused() {
     let of = |response| TunerSettings { response, ..settings() };
     let probing = |probing| TunerSettings { probing, ..settings() };
     let usual = Probing::of_scale(1.0);
+    let supervised = |supervision| TunerSettings { supervision, ..settings() };
+    let of_scale = Supervision::of_scale(1.0);
     let cases = [
         ("frequency", of(ResponseWanted { frequency: 0.0, ..WANTED })),
         ("frequency", of(ResponseWanted { frequency: f32::NAN, ..WANTED })),
@@ -30,6 +32,12 @@ fn settings_out_of_their_range_are_refused() {
         ("probing", probing(Probing { largest: 0.01, ..usual })),
         ("probing", probing(Probing { at_least: 300, ..usual })),
         ("range", TunerSettings { sensor: Sensor { range: 1.0..=0.0, ..Sensor::default() }, ..settings() }),
+        ("excitation", supervised(Supervision { excitation: -0.1, ..of_scale })),
+        ("excitation", supervised(Supervision { excitation: f32::INFINITY, ..of_scale })),
+        ("saturated", supervised(Supervision { saturated: 1.1, ..of_scale })),
+        ("innovations", supervised(Supervision { innovations: f32::NAN, ..of_scale })),
+        ("innovations", supervised(Supervision { innovations: 0.5, ..of_scale })),
+        ("fallback", supervised(Supervision { fallback: Fallback::Input(f32::NAN), ..of_scale })),
     ];
     for (name, settings) in cases {
         assert!(refused(tuner(&settings, 0.98), name), "{settings:?}");
@@ -52,6 +60,8 @@ fn orders_and_numbers_out_of_their_range_are_refused() -> Result<(), Error> {
     assert!(refused(usual()?.with_peaks(0.5, 2.0), "peaks"));
     assert!(refused(usual()?.with_peaks(3.0, 2.0), "peaks"));
     assert!(refused(usual()?.probe(1.5, 3), "share"));
+    assert!(refused(usual()?.set_gain_sign(f32::NAN), "gain_sign"));
+    assert!(refused(usual()?.set_fallback(Fallback::Input(f32::INFINITY)), "fallback"));
     assert!(refused(usual()?.probe(f32::NAN, 3), "share"));
     type Small = DirectSelfTuner<f32, Const<3>, Const<1>, Const<2>>;
     let small = DirectOrders { na: 1, nb: 1, delay: 1, constant: true };

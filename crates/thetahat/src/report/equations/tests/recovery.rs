@@ -2,10 +2,10 @@
 
 use thetahat_numerics::optimize::Stopped;
 
-use super::models::{Found, TRUTH, fitted, log, pendulum, pendulum_text};
+use super::models::{Found, TRUTH, fitted, joined, log, pendulum, pendulum_text};
 use crate::data::Recording;
 use crate::model::GreyBox;
-use crate::respond::Horizon;
+use crate::respond::{Horizon, InitialCondition};
 
 fn found(model: &GreyBox, log: Recording) -> Found {
     fitted(model, &[log]).unwrap()
@@ -49,6 +49,26 @@ fn holes_in_the_log_do_no_harm() {
     let nis = report.outcome.nis.unwrap();
     assert_eq!((nis.rows, nis.expected), (560, 880.0 / 560.0));
     assert_near(&report, 3.0);
+}
+
+#[test]
+fn a_row_that_is_predicted_from_the_start_alone_does_not_count_ahead() {
+    // Nothing is measured in the first two rows: the third one is predicted from the start too.
+    let model = pendulum(2, 2);
+    let mut log = log(&model, &TRUTH[..2], 400, 100, 1.0);
+    for channel in log.channels.iter_mut().skip(1) {
+        channel.values[..2].fill(f64::NAN);
+    }
+    let found = found(&model, log.clone());
+    let one = found.fit("y1", Horizon::Steps { steps: 1 });
+    assert_eq!((one.samples, found.fit("y1", Horizon::FreeRun).samples), (397, 398));
+    let ahead = |steps| {
+        let horizon = Horizon::Steps { steps };
+        let log = joined(std::slice::from_ref(&log)).unwrap();
+        let applied = found.report.apply(&log, &[], None, horizon, InitialCondition::Estimate).unwrap();
+        applied.outputs[0].fit.as_ref().unwrap().samples
+    };
+    assert_eq!([ahead(1), ahead(2), ahead(5)], [397, 396, 393]);
 }
 
 #[test]

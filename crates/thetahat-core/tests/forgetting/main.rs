@@ -3,6 +3,8 @@
 //!
 //! The table is printed by `cargo test -p thetahat-core --test forgetting table -- --nocapture`.
 
+mod held;
+
 use std::fmt::Write;
 
 use thetahat_core::nalgebra::{Const, SVector, convert};
@@ -95,13 +97,17 @@ impl<T: Real, const K: usize> Run<T, K> {
         (self.parameters() - truth).norm()
     }
 
-    /// The share of the 95 % intervals that hold the truth.
-    fn covered(&self, truth: &SVector<f64, K>) -> f64 {
+    /// The distance of each parameter from the truth, in its standard errors.
+    fn off(&self, truth: &SVector<f64, K>) -> SVector<f64, K> {
         let errors = self.estimator.standard_errors().expect("many samples");
         let errors: SVector<f64, K> =
             self.ordered(&errors.map(|value| value.to_subset().expect("a number")).into()).into();
-        let off = (self.parameters() - truth).component_div(&errors);
-        off.iter().filter(|off| off.abs() < 1.96).count() as f64 / K as f64
+        (self.parameters() - truth).component_div(&errors)
+    }
+
+    /// The share of the 95 % intervals that hold the truth.
+    fn covered(&self, truth: &SVector<f64, K>) -> f64 {
+        self.off(truth).iter().filter(|off| off.abs() < 1.96).count() as f64 / K as f64
     }
 }
 
@@ -285,7 +291,7 @@ fn table_of_the_policies() {
         table.push('\n');
     }
     println!("{table}");
-    assert!(include_str!("../src/forgetting.rs").contains(&table), "the table of the doc is out of date");
+    assert!(include_str!("../../src/forgetting.rs").contains(&table), "the table of the doc is out of date");
 }
 
 /// What selective forgetting promises, in both precisions.

@@ -44,6 +44,7 @@ mod annealing;
 pub mod normal;
 mod objective;
 mod options;
+mod orthogonal;
 mod outcome;
 mod quasi_newton;
 mod search;

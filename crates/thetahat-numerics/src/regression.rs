@@ -31,7 +31,7 @@ pub use kernel::{
 pub use lagged::{Lagged, Presample, Taps};
 pub use lagged_moments::LaggedMoments;
 pub use monomials::{Moments, Monomials};
-pub use qr::factor_rows;
+pub use qr::{Folding, factor_rows};
 pub use solve::Solver;
 pub use solve::{Regression, SAFE_NORMS, Unsolved, condition};
 pub use span::Span;

@@ -52,6 +52,7 @@ mod prediction_error;
 mod predictor;
 mod process;
 mod refinement;
+mod reflection;
 mod restart;
 mod robust;
 mod start;

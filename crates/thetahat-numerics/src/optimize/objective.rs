@@ -57,6 +57,27 @@ pub trait Objective {
         0..0
     }
 
+    /// Writes R and Q'e with psi = Q R, the free responses taken out, as exact as an orthogonal method, at the current
+    /// point: a row of R and its number of Q'e, one row after the other. Says whether there is one: not where J is no
+    /// sum of squares.
+    fn triangle(&mut self, _into: &mut [f64]) -> bool {
+        false
+    }
+
+    /// The coordinates of a search: where parameters have a region, none has a border. Says whether there are any but
+    /// the parameters themselves.
+    fn coordinates(&mut self, _parameters: &[f64], _into: &mut [f64]) -> bool {
+        false
+    }
+
+    /// Whether a coordinate is another number than the parameter in its place.
+    fn is_curved(&self, _place: usize) -> bool {
+        false
+    }
+
+    /// The parameters of these coordinates, and into `slopes`, row by row, their derivatives.
+    fn parameters(&mut self, _coordinates: &[f64], _into: &mut [f64], _slopes: Option<&mut [f64]>) {}
+
     /// Sets the weights of the free responses to zero.
     fn restart(&mut self) {}
 

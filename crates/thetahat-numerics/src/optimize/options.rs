@@ -59,6 +59,9 @@ pub struct Search {
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
     pub initial_parameters: Option<Vec<f64>>,
+    /// Whether steps are made by orthogonal transformations in the coordinates of the objective from the beginning on,
+    /// and not only where others end.
+    pub orthogonal: bool,
     /// Whether the plant is found first, with the least errors of its free run, and the noise after it: for models that
     /// simulate. Else all parameters together have the least errors one step ahead.
     pub plant_first: bool,
@@ -111,6 +114,7 @@ impl Default for Search {
             seed: 0,
             time_limit: None,
             initial_parameters: None,
+            orthogonal: false,
             plant_first: false,
         }
     }

@@ -10,6 +10,8 @@ use crate::Error;
 
 /// The first damping of Levenberg and Marquardt. A larger one wastes iterations on fast-sampled plants.
 const FIRST_DAMPING: f64 = 1e-8;
+/// The first one of steps by orthogonal transformations, which begin without any.
+const FIRST_ORTHOGONAL_DAMPING: f64 = 1e-14;
 /// The last step is taken if it predicts more than this fraction of the tolerance.
 const WORTH_TAKING: f64 = 0.01;
 /// After so many halvings no step is long enough to matter.
@@ -19,6 +21,8 @@ const DRAWN_IN: usize = 3;
 const MOST_ITERATIONS: usize = 10_000;
 /// A predicted decrease of this fraction of the cost is lost in rounding.
 const ROUNDING: f64 = 1e-10;
+/// A step that lowers the cost by this fraction of what was predicted is a good one.
+const GOOD: f64 = 0.75;
 /// Where the cost falls by so many times what was predicted, a longer step is tried.
 const BETTER: f64 = 1.2;
 
@@ -66,6 +70,7 @@ pub fn search<O: Objective>(
         parameters: start,
         cost,
         damping: FIRST_DAMPING,
+        may_turn: matches!(options.algorithm, Algorithm::LevenbergMarquardt | Algorithm::Annealing),
         unstable_steps: 0,
         stability_bound: false,
         drawn_in: 0,
@@ -84,8 +89,19 @@ pub fn search<O: Objective>(
             Ok(gain) => gain,
             Err(refusal) => return Ok(Err(refusal)),
         };
-        let predicted = descent.workspace.scale(descent.objective) + free_gain;
+        let mut predicted = if options.orthogonal && iteration == 0 && descent.may_turn {
+            descent.turned(f64::NAN, free_gain)
+        } else {
+            f64::NAN
+        };
+        if predicted.is_nan() {
+            predicted = descent.workspace.scale(descent.objective, &descent.parameters) + free_gain;
+        }
         let scale = descent.objective.scale(descent.cost);
+        let ends = predicted <= options.tolerance * scale;
+        if descent.may_turn && descent.cost > smallest && ends && descent.workspace.is_lost() {
+            predicted = descent.turned(predicted, free_gain);
+        }
         gradient_norm =
             (descent.workspace.right.iter().map(|value| value * value).sum::<f64>() / scale).sqrt();
         if descent.cost <= smallest || predicted <= options.tolerance * scale {
@@ -103,7 +119,13 @@ pub fn search<O: Objective>(
             break Stopped::TimeLimit;
         }
         let rule = descent.direction(options, iteration);
+        let may_turn = descent.may_turn;
         let Some(accepted) = descent.step(rule, free_gain) else {
+            // The errors of the point again.
+            if may_turn && descent.objective.linearize().is_ok() {
+                descent.turned(0.0, free_gain);
+                continue;
+            }
             let rounding = predicted <= descent.rounding();
             break if rounding && !descent.stability_bound { Stopped::Converged } else { Stopped::NoDescent };
         };
@@ -113,6 +135,10 @@ pub fn search<O: Objective>(
         costs.push(accepted.cost);
         let scale = descent.objective.scale(descent.cost);
         if accepted.predicted == f64::INFINITY && fall <= options.tolerance * scale {
+            if descent.may_turn && descent.objective.linearize().is_ok() {
+                descent.turned(0.0, 0.0);
+                continue;
+            }
             break Stopped::NoDescent;
         }
         // What is left to gain is lost in rounding, and so is what a step gains.
@@ -132,6 +158,8 @@ struct Descent<'o, O> {
     parameters: Vec<f64>,
     cost: f64,
     damping: f64,
+    /// Whether it may go on by orthogonal transformations.
+    may_turn: bool,
     /// Trials that were refused as they are outside, whether there was one in the last iteration, and how many were drawn in in
     /// vain.
     unstable_steps: usize,
@@ -145,12 +173,20 @@ impl<O: Objective> Descent<'_, O> {
         ROUNDING * self.objective.scale(self.cost).max(self.cost.abs())
     }
 
+    /// Goes on by orthogonal transformations where the objective has them: the decrease that they predict, else what
+    /// was predicted.
+    fn turned(&mut self, predicted: f64, free_gain: f64) -> f64 {
+        self.may_turn = false;
+        let Some(found) = self.workspace.turn(self.objective, &self.parameters) else { return predicted };
+        self.damping = 0.0;
+        found + free_gain
+    }
+
     /// Takes the full step that is there already, if it lowers the cost, and gives the cost then: where convergence is slow, it is
     /// a good part of the way that is left.
     fn last_step(&mut self) -> Option<f64> {
-        self.workspace.apply(&self.parameters, 1.0);
-        self.objective.try_free(&self.workspace.moved);
-        match self.objective.evaluate(&self.workspace.trial) {
+        self.workspace.apply(self.objective, &self.parameters, 1.0);
+        match self.cost_of_trial(0.0) {
             Ok(value) if value < self.cost => {
                 self.parameters.copy_from_slice(&self.workspace.trial);
                 self.cost = value;
@@ -188,11 +224,12 @@ impl<O: Objective> Descent<'_, O> {
             self.return_to_point();
             return None;
         };
+        let least = if self.workspace.orthogonal.is_some() { 0.0 } else { SMALLEST_DAMPING };
         let fall = self.cost - accepted.cost;
-        if fall > 0.75 * accepted.predicted {
-            self.damping = (self.damping / 10.0).max(SMALLEST_DAMPING);
+        if fall > GOOD * accepted.predicted {
+            self.damping = (self.damping / 10.0).max(least);
         } else if fall > 0.25 * accepted.predicted {
-            self.damping = (self.damping / 3.0).max(SMALLEST_DAMPING);
+            self.damping = (self.damping / 3.0).max(least);
         }
         if O::STEP_RULES.lengthens && fall > BETTER * accepted.predicted {
             accepted.cost = self.lengthened(accepted.cost);
@@ -209,14 +246,14 @@ impl<O: Objective> Descent<'_, O> {
             if rule == Rule::Damped && (tries == 0 || tries > shortenings) {
                 self.workspace.solve_damped(self.damping);
             }
-            let predicted = self.workspace.apply(&self.parameters, fraction) + free_gain;
-            self.objective.try_free(&self.workspace.moved);
-            match self.objective.evaluate(&self.workspace.trial) {
+            let predicted = self.workspace.apply(self.objective, &self.parameters, fraction) + free_gain;
+            match self.cost_of_trial(GOOD * predicted) {
                 Ok(cost) if cost < self.cost => return Some(Accepted { cost, predicted }),
                 Err(refusal) if O::is_outside(&refusal) => {
-                    self.stability_bound = true;
                     self.unstable_steps += 1;
+                    self.stability_bound = true;
                     if tries == 0
+                        && self.workspace.orthogonal.is_none()
                         && self.drawn_in < DRAWN_IN
                         && self.objective.draw_in(&self.parameters, &mut self.workspace.trial)
                     {
@@ -231,7 +268,12 @@ impl<O: Objective> Descent<'_, O> {
             tries += 1;
             if rule == Rule::Damped && tries > shortenings {
                 fraction = 1.0;
-                self.damping = (self.damping * 10.0).max(FIRST_DAMPING);
+                let first = if self.workspace.orthogonal.is_some() {
+                    FIRST_ORTHOGONAL_DAMPING
+                } else {
+                    FIRST_DAMPING
+                };
+                self.damping = (self.damping * 10.0).max(first);
             } else {
                 fraction /= 2.0;
             }
@@ -279,7 +321,25 @@ impl<O: Objective> Descent<'_, O> {
         cost
     }
 
+    /// The cost of the trial in the workspace, with free responses that go with the step. By orthogonal
+    /// transformations, whose steps are long, with those that are best, and so are the parameters that errors are
+    /// linear in (Golub and Pereyra 1973; Kaufman 1975), unless the cost falls by `enough` without.
+    fn cost_of_trial(&mut self, enough: f64) -> Result<f64, O::Refusal> {
+        self.objective.try_free(&self.workspace.moved);
+        let cost = self.objective.evaluate(&self.workspace.trial);
+        let falls = matches!(&cost, Ok(cost) if *cost <= self.cost - enough);
+        if falls || self.workspace.orthogonal.is_none() {
+            return cost;
+        }
+        let Workspace { trial, factor, moved, .. } = &mut self.workspace;
+        solve_linear(self.objective, trial, factor, moved)
+    }
+
     fn return_to_point(&mut self) {
+        if self.workspace.orthogonal.is_some() {
+            let _ = best_free(self.objective, &self.parameters);
+            return;
+        }
         self.objective.keep_free();
         // It has been evaluated before.
         let _ = self.objective.evaluate(&self.parameters);

@@ -2,11 +2,14 @@
 
 use super::normal;
 use super::objective::Objective;
+use super::orthogonal::Orthogonal;
 
 /// Always there: directions in which the matrix is nothing but rounding predict no decrease.
 pub(super) const SMALLEST_DAMPING: f64 = 1e-12;
 /// With a damping beyond this no step is long enough to matter.
 pub(super) const LARGEST_DAMPING: f64 = 1e12;
+/// Where columns differ by less than this of their squares, sums of squares have lost half of the digits.
+const LOST: f64 = 1e-8;
 /// The first perturbation of a Hessian that is not positive definite, beside a diagonal near 1.
 const FIRST_PERTURBATION: f64 = 1e-4;
 /// The relative step of differences of the gradient.
@@ -25,6 +28,8 @@ pub(super) struct Workspace {
     scales: Vec<f64>,
     /// The scaled gradient.
     pub(super) right: Vec<f64>,
+    /// Takes the place of the scaled matrix once that is not exact enough.
+    pub(super) orthogonal: Option<Orthogonal>,
     /// The Hessian of Newton's method.
     hessian: Vec<f64>,
     center: Vec<f64>,
@@ -42,6 +47,7 @@ impl Workspace {
             trial: line(),
             scales: line(),
             right: line(),
+            orthogonal: None,
             hessian: if newton { square() } else { Vec::new() },
             center: line(),
         }
@@ -49,12 +55,19 @@ impl Workspace {
 
     /// Scales the normal equations so that the matrix has a unit diagonal, and solves them. Gives the decrease of the cost
     /// that the solution predicts.
-    pub(super) fn scale(&mut self, objective: &impl Objective) -> f64 {
+    pub(super) fn scale(&mut self, objective: &mut impl Objective, parameters: &[f64]) -> f64 {
+        if let Some(orthogonal) = &mut self.orthogonal {
+            if let Some(predicted) = orthogonal.scale(objective, parameters, &mut self.right, &mut self.step)
+            {
+                return predicted;
+            }
+            self.orthogonal = None;
+        }
         let size = self.scales.len();
         for (index, scale) in self.scales.iter_mut().enumerate() {
             let diagonal = objective.matrix()[index * size + index];
-            // A column of zeros stays one.
-            *scale = if diagonal > 0.0 { diagonal.sqrt() } else { 1.0 };
+            // A column of which nothing is left but rounding, whose square may be negative, has no step.
+            *scale = if diagonal > 0.0 { diagonal.sqrt() } else { f64::INFINITY };
             self.right[index] = objective.right()[index] / *scale;
         }
         for row in 0..size {
@@ -67,8 +80,32 @@ impl Workspace {
         self.step.iter().zip(&self.right).map(|(step, right)| step * right).sum()
     }
 
+    /// Goes on by orthogonal transformations, and gives the decrease that these predict; none where it does so already,
+    /// or the objective has no triangle.
+    pub(super) fn turn(&mut self, objective: &mut impl Objective, parameters: &[f64]) -> Option<f64> {
+        if self.orthogonal.is_some() {
+            return None;
+        }
+        let mut orthogonal = Orthogonal::new(parameters.len());
+        let predicted = orthogonal.scale(objective, parameters, &mut self.right, &mut self.step)?;
+        self.orthogonal = Some(orthogonal);
+        Some(predicted)
+    }
+
+    /// Whether the normal equations that were solved last have lost digits that count.
+    pub(super) fn is_lost(&self) -> bool {
+        let size = self.scales.len();
+        let least = (0..size).map(|index| self.factor[index * (size + 1)]).fold(f64::INFINITY, f64::min);
+        let largest = (0..size).map(|index| self.factor[index * (size + 1)]).fold(0.0, f64::max);
+        self.orthogonal.is_none() && (least * least < LOST || largest == f64::INFINITY)
+    }
+
     /// `(G + damping I) step = g`.
     pub(super) fn solve_damped(&mut self, damping: f64) {
+        if let Some(orthogonal) = &mut self.orthogonal {
+            orthogonal.solve_damped(damping, &mut self.step);
+            return;
+        }
         let size = self.scales.len();
         self.factor.copy_from_slice(&self.scaled);
         (0..size).for_each(|index| self.factor[index * size + index] += damping);
@@ -131,7 +168,11 @@ impl Workspace {
     }
 
     /// Where a fraction of the step leads, and the decrease of the cost that it predicts: 2 g's - s'G s.
-    pub(super) fn apply(&mut self, parameters: &[f64], fraction: f64) -> f64 {
+    pub(super) fn apply(&mut self, objective: &mut impl Objective, parameters: &[f64], fraction: f64) -> f64 {
+        if let Some(orthogonal) = &mut self.orthogonal {
+            let places = [&mut self.step[..], &mut self.trial, &mut self.moved];
+            return orthogonal.apply(objective, parameters, fraction, places);
+        }
         let size = self.scales.len();
         let mut predicted = 0.0;
         for (row, parameter) in parameters.iter().enumerate() {

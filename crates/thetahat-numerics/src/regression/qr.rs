@@ -85,8 +85,19 @@ fn block_factor(
     folding.finish(scales)
 }
 
-/// A triangle that takes blocks of rows. The last column is the target.
-struct Folding {
+/// A triangle that takes blocks of rows, on memory that is taken once. The last column is the target.
+///
+/// ```
+/// use thetahat_numerics::regression::Folding;
+///
+/// // y = 2 x, in two rows.
+/// let rows = [[3.0, 6.0], [4.0, 8.0]];
+/// let mut folding = Folding::new(2);
+/// folding.fold(2, |column, values| values.iter_mut().zip(rows).for_each(|(value, row)| *value = row[column]));
+/// assert!((folding.entry(0, 1) / folding.entry(0, 0) - 2.0).abs() < 1e-15);
+/// ```
+#[derive(Debug)]
+pub struct Folding {
     triangle: DMatrix<f64>,
     rows: usize,
     /// The new rows, column by column.
@@ -94,13 +105,31 @@ struct Folding {
 }
 
 impl Folding {
-    fn new(size: usize) -> Self {
+    /// Rows that are folded at once, at most.
+    pub const ROWS: usize = ROWS;
+
+    /// For rows of so many numbers.
+    pub fn new(size: usize) -> Self {
         Self { triangle: DMatrix::zeros(size, size), rows: 0, block: vec![0.0; size * ROWS] }
     }
 
-    /// Folds at most [`ROWS`] rows; `fill` writes their columns.
-    fn fold(&mut self, rows: usize, mut fill: impl FnMut(usize, &mut [f64])) {
-        let size = self.triangle.ncols();
+    /// Begins anew.
+    pub fn clear(&mut self) {
+        self.triangle.fill(0.0);
+        self.rows = 0;
+    }
+
+    /// A number of the triangle.
+    pub fn entry(&self, row: usize, column: usize) -> f64 {
+        self.triangle[(row, column)]
+    }
+
+    /// Folds at most [`Self::ROWS`] rows, and of more the first; `fill` writes their columns. 2 rows size² flops.
+    pub fn fold(&mut self, rows: usize, mut fill: impl FnMut(usize, &mut [f64])) {
+        let (size, rows) = (self.triangle.ncols(), rows.min(ROWS));
+        if rows == 0 {
+            return;
+        }
         let block = &mut self.block[..size * rows];
         for (column, values) in block.chunks_exact_mut(rows).enumerate() {
             fill(column, values);

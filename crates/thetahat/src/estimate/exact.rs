@@ -41,14 +41,14 @@ use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Search, S
 use super::arx::{out_of_range, rows, signals};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Polynomials;
-use super::prediction_error::{flat, prediction_error};
+use super::prediction_error::{ON_CIRCLE, flat, prediction_error, told};
 use super::stretches::{energy, filled};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::{Record, measured};
 use crate::model::{
     Orders, Structure,
-    polynomial::{is_stable, multiply_out, roots},
+    polynomial::{multiply_out, roots},
 };
 use crate::respond::{NOTHING_LEFT, are_worth};
 use likelihood::{InitialCondition, Likelihood};
@@ -306,6 +306,7 @@ impl<'r> Job<'_, 'r> {
     /// The estimate of a search.
     fn finish(&self, reached: Reached<'_>) -> Result<Estimate, Error> {
         let Reached { mut likelihood, found, begin, starts } = reached;
+        let found = told(self.orders, found);
         // Steps that were tried last may have left it elsewhere. It has normal equations.
         let _ = likelihood.linearize();
         let (size, samples) = (found.parameters.len(), likelihood.samples());
@@ -339,12 +340,12 @@ impl<'r> Job<'_, 'r> {
     }
 }
 
-/// Moves the roots of a polynomial that are not well inside the unit circle onto a circle inside of it.
+/// Moves the roots of a polynomial that are on the unit circle or outside onto a circle inside of it.
 fn drawn_in(monic: &mut [f64]) {
-    if is_stable(monic, &mut Vec::new()) {
+    let Some(found) = roots(monic) else { return };
+    if found.iter().all(|root| root.modulus() < 1.0 - ON_CIRCLE) {
         return;
     }
-    let Some(found) = roots(monic) else { return };
     let mut product = Vec::new();
     multiply_out(found.iter().map(|root| *root * (INSIDE / root.modulus()).min(1.0)), &mut product);
     monic.iter_mut().zip(&product).for_each(|(value, product)| *value = product.re);

@@ -179,7 +179,10 @@ impl Stage<'_> {
         let (gram, right, _) = Lagged::new(&self.signals, taps, segments, self.presample).normal_equations();
         let phi = |k: usize| if k < na { size + k } else { k };
         let cross = DMatrix::from_fn(size, size, |i, j| gram[(i, phi(j))]);
-        let inverse = inverse(&cross)?;
+        let square = |k: usize| gram[(k, k)];
+        let squares: [Vec<f64>; 2] =
+            [(0..size).map(square).collect(), (0..size).map(|j| square(phi(j))).collect()];
+        let inverse = inverse(&cross, squares)?;
         let mut theta = &inverse * right.rows(0, size);
         // With true residuals, as rounding in the sums is of the size of y.
         for _ in 0..CORRECTIONS {

@@ -20,13 +20,15 @@ use super::uncertainty::{autoregression, backward_filtered_products, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
-use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
+use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation, polynomial::roots};
 use crate::respond::{NOTHING_LEFT, are_worth};
 
 /// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.
 const EASY_ITERATIONS: usize = 5;
 /// Above this condition number the Gram matrix does not give the covariance to a thousandth.
 const MAXIMUM_CONDITION: f64 = 5e6;
+/// A root of C or F that is nearer to the unit circle is on it.
+pub(super) const ON_CIRCLE: f64 = 1e-6;
 
 pub(crate) fn drop_is_not_for_f() -> Error {
     Error::argument(
@@ -157,6 +159,7 @@ impl Job<'_> {
                     let samples = Some(small.samples());
                     return Ok(TrackStart {
                         parameters,
+                        orthogonal: false,
                         starts,
                         unstable_pole,
                         samples,
@@ -184,7 +187,7 @@ impl Job<'_> {
     ) -> Result<Option<Found>, Error> {
         let mut found = match &beginning.found {
             Some(found) => Some(found.clone()),
-            None => self.search(predictor, &beginning.parameters)?.ok(),
+            None => self.search(predictor, &beginning.parameters, beginning.orthogonal)?.ok(),
         };
         let easy =
             |found: &Found| found.stopped == Stopped::Converged && found.costs.len() <= EASY_ITERATIONS + 1;
@@ -195,10 +198,10 @@ impl Job<'_> {
                 Some(record) => self.nested_below(Problem { record, orders, begin }, predictor, lowest)?,
                 None => None,
             };
-            if let Some((outcome, parameters)) = nested
-                && let Ok(better) = self.search(predictor, &parameters)?
+            if let Some(start) = nested
+                && let Ok(better) = self.search(predictor, &start.parameters, start.orthogonal)?
             {
-                beginning.starts.insert(0, outcome);
+                beginning.starts.insert(0, start.outcome);
                 return Ok(Some(better));
             }
         } else if beginning.found.is_none() {
@@ -254,7 +257,7 @@ impl Job<'_> {
             let predicted = best_free(&mut resting, &free.parameters)
                 .map_or(f64::INFINITY, |cost| cost - predicted_decrease(&mut resting));
             if !worth(predicted, free.cost()) {
-                at_rest = self.search(&mut resting, &free.parameters)?.ok();
+                at_rest = self.search(&mut resting, &free.parameters, false)?.ok();
             }
         }
         if let Some(found) = at_rest.filter(|found| !worth(found.cost(), free.cost())) {
@@ -297,7 +300,7 @@ impl Job<'_> {
         else {
             return Ok(reached);
         };
-        let Ok(found) = self.search(&mut wide, start)? else { return Ok(reached) };
+        let Ok(found) = self.search(&mut wide, start, false)? else { return Ok(reached) };
         let with = mean(found.cost(), &wide);
         if !worth(given, with, few) {
             return Ok(reached);
@@ -307,7 +310,7 @@ impl Job<'_> {
         let same_place = best_free(&mut narrow, &found.parameters);
         if let Ok(cost) = same_place
             && !worth(mean(cost, &narrow), with, narrow.initial_conditions())
-            && let Ok(found) = self.search(&mut narrow, &found.parameters)?
+            && let Ok(found) = self.search(&mut narrow, &found.parameters, false)?
         {
             return Ok(Reached { predictor: narrow, found, initial: Initial::Estimate });
         }
@@ -318,8 +321,9 @@ impl Job<'_> {
         &self,
         predictor: &mut E,
         parameters: &[f64],
+        orthogonal: bool,
     ) -> Result<Result<Found, Unusable>, Error> {
-        self.search_with(predictor, parameters, self.options)
+        self.search_with(predictor, parameters, &Search { orthogonal, ..self.options.clone() })
     }
 
     fn search_with<E: PredictionErrors>(
@@ -340,6 +344,7 @@ impl Job<'_> {
         beginning: TrackStart,
         initial: Initial,
     ) -> Result<Estimate, Error> {
+        let found = told(orders, found);
         let (size, samples) = (found.parameters.len(), predictor.samples());
         let cost = found.cost();
         let initial_conditions = predictor.initial_conditions();
@@ -373,6 +378,8 @@ impl Job<'_> {
 /// Where the search on the whole record begins.
 struct TrackStart {
     parameters: Vec<f64>,
+    /// Whether the search goes on from there in the coordinates of the objective.
+    orthogonal: bool,
     /// All starts, the best first.
     starts: Vec<StartOutcome>,
     /// The largest modulus of a pole of theirs that had to be reflected.
@@ -400,6 +407,18 @@ fn hopeless(orders: &Orders) -> Error {
         orders.names(),
         "no start of the search has a finite cost; scale the channels towards one, or lower the orders",
     )
+}
+
+/// What was found, said to be at the border of stability where C or an F has a root on the unit circle: a search in
+/// coordinates that know no border does not see it.
+pub(super) fn told(orders: &Orders, found: Found) -> Found {
+    let model = PolynomialModel::from_parameters(orders, &found.parameters, None, 0.0, 1.0);
+    let is_on_circle = |polynomial: &Vec<f64>| {
+        let roots = roots(polynomial).unwrap_or_default();
+        roots.iter().any(|root| root.re.hypot(root.im) > 1.0 - ON_CIRCLE)
+    };
+    let at_border = model.is_ok_and(|model| std::iter::once(&model.c).chain(&model.f).any(is_on_circle));
+    Found { stability_bound: found.stability_bound || at_border, ..found }
 }
 
 /// The covariance matrix of the parameters, and the condition number of psi.

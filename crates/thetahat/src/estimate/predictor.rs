@@ -47,7 +47,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
-use thetahat_numerics::regression::{Products, Taps, factor_rows, sum, sum_of_squares};
+use thetahat_numerics::regression::{Folding, Products, Taps, factor_rows, sum, sum_of_squares};
 
 use super::border::Border;
 use super::polynomials::{Polynomials, Unusable};
@@ -224,6 +224,8 @@ pub(crate) struct Predictor<'a> {
     pub(super) matrix: Vec<f64>,
     pub(super) right: Vec<f64>,
     border: Border,
+    /// Memory for the triangle of psi: of all sections, then of one of each layout.
+    foldings: Vec<Folding>,
 }
 
 impl<'a> Predictor<'a> {
@@ -309,6 +311,7 @@ impl<'a> Predictor<'a> {
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
             border: Border::new(orders, false),
+            foldings: Vec::new(),
             layouts,
             sections,
         }
@@ -524,23 +527,13 @@ impl<'a> Predictor<'a> {
             let layout = &self.layouts[section.layout];
             let free = layout.free;
             let count = parameters + free;
-            let (columns, shifts) = layout.columns.split_at(count);
-            let entry = |row: usize, column: usize| {
-                // The initial-condition responses come first: what is left of the parameters stands below them in the factor.
-                let index = if column < free { parameters + column } else { column - free };
-                let Some(Column { signal, lag, sign, .. }) = columns.get(index) else {
-                    return section.signals[0][row];
-                };
-                let at = |signal: usize, lag: usize| {
-                    if row < lag { 0.0 } else { section.signals[signal][row - lag] }
-                };
-                let weights = &section.corrections[index * shifts.len()..][..shifts.len()];
-                let corrections =
-                    shifts.iter().zip(weights).map(|(shift, weight)| weight * at(shift.signal, shift.lag));
-                sign * at(*signal, *lag) + corrections.sum::<f64>()
-            };
             let rows: Vec<usize> = section.runs.iter().cloned().flatten().collect();
-            let own = factor_rows(0..rows.len(), |number, column| entry(rows[number], column), count + 1)?;
+            // Initial conditions take all that so few samples say.
+            if rows.len() <= free {
+                continue;
+            }
+            let entry = |number: usize, column: usize| section.sensitivity(layout, rows[number], column);
+            let own = factor_rows(0..rows.len(), entry, count + 1)?;
             let triangle = own.factor().view((free, free), (parameters, parameters)).into_owned();
             let rotated = own.rotated_output().rows(free, parameters).into_owned();
             whole.merge(&LeastSquares::from_factor(
@@ -551,6 +544,53 @@ impl<'a> Predictor<'a> {
             )?)?;
         }
         Ok(whole)
+    }
+
+    /// Writes the factor of psi and Q'e, with the weights of errors and the initial-condition responses taken out, at
+    /// the current point: as exact as [`Self::factor`] but for what is lost over many samples, on memory that is taken
+    /// once. 2 N p² flops.
+    fn write_triangle(&mut self, into: &mut [f64]) {
+        let parameters = self.right.len();
+        if self.foldings.is_empty() {
+            let sizes = self.layouts.iter().map(|layout| parameters + layout.free + 1);
+            self.foldings = std::iter::once(parameters + 1).chain(sizes).map(Folding::new).collect();
+        }
+        let Some((whole, foldings)) = self.foldings.split_first_mut() else { return };
+        whole.clear();
+        for section in &self.sections {
+            let (layout, own) = (&self.layouts[section.layout], &mut foldings[section.layout]);
+            // Initial conditions take all that so few samples say.
+            if section.runs.iter().map(Range::len).sum::<usize>() <= layout.free {
+                continue;
+            }
+            own.clear();
+            for run in &section.runs {
+                for from in run.clone().step_by(Folding::ROWS) {
+                    own.fold(Folding::ROWS.min(run.end - from), |column, values| {
+                        for (value, row) in values.iter_mut().zip(from..) {
+                            let root = |bound| loss::weight(section.signals[0][row], bound).sqrt();
+                            *value =
+                                layout.bound.map_or(1.0, root) * section.sensitivity(layout, row, column);
+                        }
+                    });
+                }
+            }
+            for from in (0..parameters).step_by(Folding::ROWS) {
+                whole.fold(Folding::ROWS.min(parameters - from), |column, values| {
+                    for (value, row) in values.iter_mut().zip(layout.free + from..) {
+                        *value = if row <= layout.free + column {
+                            own.entry(row, layout.free + column)
+                        } else {
+                            0.0
+                        };
+                    }
+                });
+            }
+        }
+        for (place, value) in into.iter_mut().enumerate() {
+            let (row, column) = (place / (parameters + 1), place % (parameters + 1));
+            *value = if row <= column { whole.entry(row, column) } else { 0.0 };
+        }
     }
 
     /// Sets the weights of the initial-condition responses to those that are best for a step of the parameters, to first order.

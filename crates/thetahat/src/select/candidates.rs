@@ -19,6 +19,9 @@ const FADING: usize = 50;
 /// Of a segment of mean length not more than this part is given to that.
 const LEAST_OF_PIECE: usize = 20;
 
+/// A root of C that is nearer to the unit circle is on it.
+const ON_CIRCLE: f64 = 1e-4;
+
 /// A model on the common samples.
 #[derive(Debug, Clone)]
 pub(super) struct Trial {
@@ -38,6 +41,14 @@ pub(super) struct Compared {
     pub(super) noise_radius: f64,
     /// What its held-out figure is made of.
     pub(super) parts: Option<Vec<f64>>,
+}
+
+impl Compared {
+    /// Whether the search for C has ended on the unit circle. Its errors one step ahead are then least for this log, by
+    /// what stands before it, and a root there says of the noise that it has no part at a frequency (Davidson 1981).
+    pub(super) fn has_ended_on_circle(&self) -> bool {
+        self.noise_radius >= 1.0 - ON_CIRCLE
+    }
 }
 
 /// What all models share.

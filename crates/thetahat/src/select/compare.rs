@@ -106,9 +106,8 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         |(Trial { orders, point }, ((held_out_mse, score), held_out))| {
             let Point { parameters, cost, .. } = point?;
             let held_out_mse = if is_held_out { Some(held_out_mse?) } else { None };
-            let unknown = (f64::INFINITY, f64::INFINITY);
-            let (radius, noise_radius) =
-                if with_blocks { held_out::radii(&orders, &parameters) } else { unknown };
+            let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
+            let noise_radius = held_out::noise_radius(&orders, &parameters);
             let guess = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
             let (held_out, parts) = held_out.unzip();

@@ -143,17 +143,24 @@ fn is_all_stable(model: &PolynomialModel) -> bool {
     std::iter::once(&model.a).chain(&model.f).all(|polynomial| is_stable(polynomial, &mut scratch))
 }
 
-/// The largest modulus of a root of A or an F, and of one of C; infinite where it is not known.
-pub(super) fn radii(orders: &Orders, parameters: &[f64]) -> (f64, f64) {
-    let Ok(model) = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0) else {
-        return (f64::INFINITY, f64::INFINITY);
+/// The largest modulus of a pole of the plant, a root of A or an F; infinite where it is not known.
+pub(super) fn radius(orders: &Orders, parameters: &[f64]) -> f64 {
+    let model = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0);
+    let largest = |model: PolynomialModel| {
+        std::iter::once(&model.a).chain(&model.f).map(|own| largest_root(own)).fold(0.0, f64::max)
     };
-    let largest = |polynomial: &Vec<f64>| {
-        let Some(roots) = roots(polynomial) else { return f64::INFINITY };
-        roots.iter().map(|root| root.re.hypot(root.im)).fold(0.0, f64::max)
-    };
-    let plant = std::iter::once(&model.a).chain(&model.f).map(largest).fold(0.0, f64::max);
-    (plant, largest(&model.c))
+    model.map_or(f64::INFINITY, largest)
+}
+
+/// The same of C.
+pub(super) fn noise_radius(orders: &Orders, parameters: &[f64]) -> f64 {
+    let model = PolynomialModel::from_parameters(orders, parameters, None, 1.0, 1.0);
+    model.map_or(f64::INFINITY, |model| largest_root(&model.c))
+}
+
+fn largest_root(polynomial: &[f64]) -> f64 {
+    let Some(roots) = roots(polynomial) else { return f64::INFINITY };
+    roots.iter().map(|root| root.re.hypot(root.im)).fold(0.0, f64::max)
 }
 
 /// The standard deviation of the output.

@@ -25,6 +25,12 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     let by_held_out_mse = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
     compared.sort_by(|a, b| better(&a.scored, &b.scored, by_held_out_mse));
+    // Who gives ranges asks for the criterion alone.
+    let on_circle = |model: &&Compared| {
+        path.is_none() && !is_exact(&model.scored, by_held_out_mse) && model.has_ended_on_circle()
+    };
+    let last = compared.iter().filter(|model| on_circle(model)).count();
+    compared.sort_by_key(on_circle);
     let order: Vec<&Candidate> = compared.iter().map(|model| &model.scored).collect();
     let (Some(&first), count) = (order.first(), compared.len()) else {
         if let Some(orders) = smallest {
@@ -64,6 +70,9 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     steps.push(format!("Compared {} on {samples} common samples by {}.", models(count), named(task.select)));
     if failed > 0 {
         steps.push(format!("The data could not determine {} more.", models(failed)));
+    }
+    if last > 0 {
+        steps.push(format!("Models whose C ended on the unit circle come last: {last}."));
     }
     if by_held_out_mse && first.orders != chosen.orders {
         steps.push(format!("Least: {}.", described(first, task.select)));
@@ -144,12 +153,18 @@ fn both(winners: &Winners, order: &[&Candidate], task: &Task<'_>) -> Vec<String>
 
 /// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.
 fn better(a: &Candidate, b: &Candidate, by_held_out_mse: bool) -> Ordering {
-    let exact =
-        |model: &Candidate| if by_held_out_mse { model.held_out_mse == Some(0.0) } else { model.mse == 0.0 };
     let score = |model: &Candidate| {
-        if exact(model) { f64::NEG_INFINITY } else { model.score.unwrap_or(f64::INFINITY) }
+        if is_exact(model, by_held_out_mse) {
+            f64::NEG_INFINITY
+        } else {
+            model.score.unwrap_or(f64::INFINITY)
+        }
     };
     score(a).total_cmp(&score(b)).then(a.parameters.cmp(&b.parameters))
+}
+
+fn is_exact(model: &Candidate, by_held_out_mse: bool) -> bool {
+    if by_held_out_mse { model.held_out_mse == Some(0.0) } else { model.mse == 0.0 }
 }
 
 pub(super) fn models(count: usize) -> String {

@@ -24,8 +24,6 @@ const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
-/// A root of C that is nearer to the unit circle is on it.
-const ON_CIRCLE: f64 = 1e-4;
 /// Mean squares below this are rounding.
 const NOTHING: f64 = 1e-12;
 
@@ -62,7 +60,7 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let fast = |k: &usize| models[*k].radius <= slowest(samples);
     let prediction = (0..models.len()).find(stable)?;
     let both = |k: usize| held_out(k).map(both);
-    let inside = |k: &usize| models[*k].noise_radius < 1.0 - ON_CIRCLE;
+    let inside = |k: &usize| !models[*k].has_ended_on_circle();
     let figures = (0..models.len()).filter(fast).filter(inside).filter_map(|k| Some((both(k)?, k)));
     let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
     let simulation = least.map_or(prediction, |(_, k)| k);

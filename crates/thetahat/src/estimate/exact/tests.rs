@@ -345,8 +345,16 @@ fn standard_errors_are_as_large_as_the_errors() {
         let record = experiment.record(0);
         let found = fit(&record, &orders(), Initial::Auto).unwrap();
         let Some(covariance) = found.covariance() else {
-            // The likelihood is largest at a root of C on the unit circle, as in some short logs.
-            assert!(outcome(found.procedure()).search.stability_bound);
+            // The likelihood is largest at a root of C on the unit circle, as in some short logs: a search from the truth ends
+            // there too.
+            let from_truth = Search { initial_parameters: Some(TRUTH.to_vec()), ..Search::default() };
+            let other =
+                exact(&record, 0, &orders(), Initial::Auto, &from_truth, &|_| ControlFlow::Continue(()))
+                    .unwrap();
+            let [found, other] = [&found, &other].map(|found| outcome(found.procedure()));
+            assert!(found.search.stability_bound);
+            let difference = other.log_likelihood.unwrap() - found.log_likelihood.unwrap();
+            assert!(difference.abs() < 1e-5, "{seed}: {difference}");
             at_the_border += 1;
             continue;
         };
@@ -355,7 +363,7 @@ fn standard_errors_are_as_large_as_the_errors() {
             *square += error * error / covariance[place][place] / runs as f64;
         }
     }
-    assert!(at_the_border <= 4, "{at_the_border}");
+    assert!(at_the_border <= 6, "{at_the_border}");
     // chi-square of 100 degrees over 100 has a deviation of 0.14.
     assert!(squares.iter().all(|square| (0.6..1.5).contains(square)), "{squares:?}");
 }

@@ -271,8 +271,11 @@ impl Samples<'_> {
             !matches!(trained.map, Map::Network { activation: Activation::Relu | Activation::Step, .. });
         let variance = squares / degrees as f64;
         let covariance = (smooth && runs.linearize().is_ok())
-            .then(|| inverse(&DMatrix::from_row_slice(size, size, runs.matrix())))
-            .flatten()
+            .then(|| DMatrix::from_row_slice(size, size, runs.matrix()))
+            .and_then(|matrix| {
+                let squares: Vec<f64> = matrix.diagonal().iter().copied().collect();
+                inverse(&matrix, [squares.clone(), squares])
+            })
             .map(|inverse| {
                 let row = |i: usize| inverse.row(i).iter().map(|entry| entry * variance).collect();
                 (0..size).map(row).collect::<Vec<Vec<f64>>>()

@@ -27,6 +27,11 @@ const SAME_COST: f64 = 1e-6;
 /// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
 /// with which a start goes on.
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
+/// The same where there is no F: iterations are cheap, and starts are few.
+const LONG_ROUND: [(usize, f64); 1] = [(100, 1.0)];
+
+/// What the name of a start ends with that is followed in the coordinates of the objective too.
+const TWIN: &str = "-orthogonal";
 
 /// The name of the start that was given.
 const GIVEN: &str = "initial-parameters";
@@ -35,11 +40,13 @@ const NESTED: &str = "nested";
 
 /// A start and how far it was followed.
 #[derive(Debug, Clone)]
-struct Start {
-    outcome: StartOutcome,
-    parameters: Vec<f64>,
+pub(super) struct Start {
+    pub(super) outcome: StartOutcome,
+    pub(super) parameters: Vec<f64>,
     /// sum e^2 there; infinite where it cannot be computed.
     cost: f64,
+    /// Whether it is followed in the coordinates of the objective.
+    pub(super) orthogonal: bool,
 }
 
 impl Job<'_> {
@@ -75,12 +82,17 @@ impl Job<'_> {
         let several = self.options.starts > 0;
         let known = !several && starts.first().is_some_and(|start| start.outcome.name == GIVEN);
         let mut compared = !has_f || !default || known || several;
-        let may_compare = has_f && default && !known && !self.deadline.is_over();
+        let may_compare = (has_f || starts.len() > 1) && default && !known && !self.deadline.is_over();
         let doubtful = may_compare && is_doubtful(problem, &starts, predictor);
         if doubtful || may_compare && several {
             starts.extend(self.nested_starts(problem, predictor)?);
             if doubtful {
-                self.compare(predictor, &mut starts)?;
+                sort(&mut starts);
+                let twins: Vec<Start> =
+                    starts.iter().filter(|start| has_f && start.cost.is_finite()).map(Start::twin).collect();
+                starts.extend(twins);
+                let rounds = if has_f { &ROUNDS[..] } else { &LONG_ROUND };
+                self.compare(predictor, &mut starts, rounds)?;
             }
             sort(&mut starts);
             compared = true;
@@ -99,16 +111,25 @@ impl Job<'_> {
         }
         let samples = None;
         if self.options.starts == 0 {
-            let parameters = starts[0].parameters.clone();
+            let (parameters, orthogonal) = (starts[0].parameters.clone(), starts[0].orthogonal);
             let starts = starts.into_iter().map(|start| start.outcome).collect();
-            return Ok(TrackStart { parameters, starts, unstable_pole, samples, compared, found: None });
+            return Ok(TrackStart {
+                parameters,
+                orthogonal,
+                starts,
+                unstable_pole,
+                samples,
+                compared,
+                found: None,
+            });
         }
         let (winner, found) = self.searched(problem, &mut starts)?;
         starts[..=winner].rotate_right(1);
         let parameters =
             found.as_ref().map_or_else(|| starts[0].parameters.clone(), |f| f.parameters.clone());
+        let orthogonal = starts[0].orthogonal;
         let starts = starts.into_iter().map(|start| start.outcome).collect();
-        Ok(TrackStart { parameters, starts, unstable_pole, samples, compared, found })
+        Ok(TrackStart { parameters, orthogonal, starts, unstable_pole, samples, compared, found })
     }
 
     fn nested_starts(
@@ -126,28 +147,33 @@ impl Job<'_> {
         problem: Problem<'_, '_>,
         predictor: &mut impl PredictionErrors,
         lowest: f64,
-    ) -> Result<Option<(StartOutcome, Vec<f64>)>, Error> {
+    ) -> Result<Option<Start>, Error> {
         let mut starts = self.nested_starts(problem, predictor)?;
-        self.compare(predictor, &mut starts)?;
-        let best = starts.into_iter().next().filter(|start| start.cost < lowest);
-        Ok(best.map(|start| (start.outcome, start.parameters)))
+        self.compare(predictor, &mut starts, &ROUNDS)?;
+        Ok(starts.into_iter().next().filter(|start| start.cost < lowest))
     }
 
     /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them by
     /// what they reach.
-    fn compare(&self, predictor: &mut impl PredictionErrors, starts: &mut [Start]) -> Result<(), Error> {
+    fn compare(
+        &self,
+        predictor: &mut impl PredictionErrors,
+        starts: &mut [Start],
+        rounds: &[(usize, f64)],
+    ) -> Result<(), Error> {
         let samples = predictor.samples() as f64;
         let mut limit = f64::INFINITY;
-        for (iterations, within) in ROUNDS {
+        for &(iterations, within) in rounds {
             sort(starts);
-            let search = Search { max_iterations: iterations, ..Search::default() };
-            let (mut before, mut lowest) = (f64::NEG_INFINITY, f64::INFINITY);
+            let (mut before, mut lowest) = ([f64::NEG_INFINITY; 2], f64::INFINITY);
             for start in starts.iter_mut().filter(|start| start.cost.is_finite() && start.cost <= limit) {
-                let same = start.cost - before <= SAME_COST * start.cost;
-                before = start.cost;
+                let same = start.cost - before[usize::from(start.orthogonal)] <= SAME_COST * start.cost;
+                before[usize::from(start.orthogonal)] = start.cost;
                 if same || self.deadline.is_over() {
                     continue;
                 }
+                let search =
+                    Search { max_iterations: iterations, orthogonal: start.orthogonal, ..Search::default() };
                 let Ok(found) = self.search_with(predictor, &start.parameters, &search)? else { continue };
                 start.cost = found.cost();
                 start.parameters = found.parameters;
@@ -175,7 +201,8 @@ impl Job<'_> {
             }
             let mut predictor = problem.predictor();
             let samples = predictor.samples() as f64;
-            Ok(self.search(&mut predictor, &start.parameters)?.ok().map(|found| (found, samples)))
+            let found = self.search(&mut predictor, &start.parameters, start.orthogonal)?;
+            Ok(found.ok().map(|found| (found, samples)))
         });
         let results = results.collect::<Result<Vec<_>, Error>>()?;
         let mut winner: Option<(usize, Found)> = None;
@@ -198,7 +225,16 @@ impl Start {
             cost: cost.map(|cost| cost / predictor.samples() as f64),
             reached: None,
         };
-        Self { outcome, parameters, cost: cost.unwrap_or(f64::INFINITY) }
+        Self { outcome, parameters, cost: cost.unwrap_or(f64::INFINITY), orthogonal: false }
+    }
+}
+
+impl Start {
+    /// The same, followed in the coordinates of the objective.
+    fn twin(&self) -> Self {
+        let mut twin = Self { orthogonal: true, ..self.clone() };
+        twin.outcome.name += TWIN;
+        twin
     }
 }
 
@@ -221,6 +257,10 @@ fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut impl 
         return true;
     }
     let recipes: Vec<&Start> = recipes.into_iter().map(|(_, start)| start).collect();
+    if !problem.orders.has_f() {
+        // Errors may have several minima over C, which no step from elsewhere shows.
+        return recipes.iter().any(|start| start.cost > (1.0 + DISAGREEMENT) * recipes[0].cost);
+    }
     match thinned(problem.record) {
         Some(thin) => {
             let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };

@@ -246,6 +246,48 @@ fn what_cannot_be_estimated_is_refused_in_words() {
     }
 }
 
+/// Products with a power of two are exact, so nothing that is compared or solved may depend on it.
+#[test]
+fn a_power_of_two_changes_no_bit() {
+    let (u, y) = public("gas_furnace.csv");
+    let other = Noise(3).take(u.len());
+    for (orders, inputs) in [
+        (Orders::armax(3, &[3], 3, &[1]).unwrap(), 1),
+        (Orders::oe(&[2], &[2], &[1]).unwrap(), 1),
+        (Orders::oe(&[4], &[4], &[1]).unwrap(), 1),
+        (Orders::bj(&[3], 0, 2, &[3], &[1]).unwrap(), 1),
+        (Orders::oe(&[2, 2], &[2, 2], &[1, 1]).unwrap(), 2),
+    ] {
+        let fit = |u_size: f64, y_size: f64| {
+            let sized = |values: &[f64], size| values.iter().map(|value| value * size).collect::<Vec<f64>>();
+            let (u, y) = (sized(&u, u_size), sized(&y, y_size));
+            let record = Record::new(&y, [&u[..], &other].into_iter().take(inputs).collect()).unwrap();
+            let estimate = found(&record, &orders, Initial::Auto, &Search::default()).unwrap();
+            (estimate.mse() / y_size / y_size, outcome(&estimate).costs.len())
+        };
+        let unit = fit(1.0, 1.0);
+        for (u_size, y_size) in [(1024.0, 1.0), (1.0, 1024.0), (0.25, 1024.0)] {
+            assert_eq!(fit(u_size, y_size), unit, "{orders} {u_size} {y_size}");
+        }
+    }
+}
+
+/// The least costs of many random starts, and of searches in several coordinates.
+#[test]
+fn the_least_known_costs_are_reached() {
+    for (file, orders, initial, least) in [
+        ("hair_dryer.csv", Orders::oe(&[5], &[5], &[1]), Initial::Zero, 0.0074508),
+        ("hair_dryer.csv", Orders::oe(&[6], &[6], &[1]), Initial::Estimate, 0.0048741),
+        ("robot_arm.csv", Orders::armax(3, &[3], 3, &[1]), Initial::Auto, 5.9027e-6),
+        ("robot_arm.csv", Orders::armax(5, &[5], 5, &[1]), Initial::Auto, 1.5316e-7),
+    ] {
+        let (u, y) = public(file);
+        let record = Record::new(&y, vec![&u]).unwrap();
+        let mse = found(&record, &orders.unwrap(), initial, &Search::default()).unwrap().mse();
+        assert!((mse / least - 1.0).abs() < 1e-3, "{file} {mse} {least}");
+    }
+}
+
 /// A log of tests/data/public without its mean: input and output.
 fn public(file: &str) -> (Vec<f64>, Vec<f64>) {
     let path = format!("{}/../../tests/data/public/{file}", env!("CARGO_MANIFEST_DIR"));

@@ -397,6 +397,22 @@ impl<'a> Section<'a> {
         self.free_gain = best.iter().zip(&self.right[parameters..]).map(|(step, right)| step * right).sum();
     }
 
+    /// A sample of a column: first of those of the initial-condition responses, then of those of psi, and e last.
+    pub(super) fn sensitivity(&self, layout: &Layout, row: usize, column: usize) -> f64 {
+        let (parameters, free) = (layout.parameters, layout.free);
+        let (columns, shifts) = layout.columns.split_at(parameters + free);
+        if column == columns.len() {
+            return self.signals[0][row];
+        }
+        let index = if column < free { parameters + column } else { column - free };
+        let Column { signal, lag, sign, .. } = columns[index];
+        let at = |signal: usize, lag: usize| if row < lag { 0.0 } else { self.signals[signal][row - lag] };
+        let weights = &self.corrections[index * shifts.len()..][..shifts.len()];
+        let corrections =
+            shifts.iter().zip(weights).map(|(shift, weight)| weight * at(shift.signal, shift.lag));
+        sign * at(signal, lag) + corrections.sum::<f64>()
+    }
+
     /// What makes psi without the initial-condition responses of psi and of these.
     pub(super) fn without_free(&self, parameters: usize, free: usize) -> DMatrix<f64> {
         DMatrix::from_fn(parameters, parameters + free, |row, column| {

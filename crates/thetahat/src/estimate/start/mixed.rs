@@ -2,17 +2,21 @@
 
 use std::ops::Range;
 
+use thetahat_core::nalgebra::Complex;
 use thetahat_numerics::optimize::Deadline;
 
 use super::Candidate;
 use super::noise::{Equation, Mixed, after};
 use super::output_error::{OutputError, Start};
 use super::plant::{Equations, Group, Input, Limits, Plant, Point, divided, energy, multiplied};
-use crate::model::Orders;
+use crate::model::{Orders, polynomial::multiply_out};
 
 /// Rounds of least squares with filtered signals.
 pub(super) const ROUNDS: usize = 3;
 const ITERATIONS: Limits = Limits { iterations: 20, tolerance: 1e-3 };
+/// The first and the last root of C of starts with a given one.
+const GIVEN: [(&str, [f64; 2]); 3] =
+    [("equal-roots", [0.3, 0.3]), ("spread-roots", [-0.6, 0.8]), ("slow-roots", [0.0, 0.95])];
 /// Below this fraction of sum y^2, a plant's errors are rounding.
 const EXACT: f64 = 1e-20;
 
@@ -46,7 +50,7 @@ pub(super) fn starts(
     let filtered = orders.nf.iter().any(|&nf| nf > 0);
     match (driven, filtered, orders.na > 0, orders.nd > 0) {
         (false, _, false, _) => data.noise().into_iter().collect(),
-        (_, false, _, false) => data.armax().into_iter().collect(),
+        (_, false, _, false) => data.armax(),
         (_, false, true, true) => data.ararmax(),
         (_, _, false, _) => data.box_jenkins(&data.output_error().starts()),
         (_, true, true, _) => data.general(),
@@ -98,17 +102,41 @@ impl<'a> Data<'a> {
             .hannan_rissanen(self.orders.nc)
     }
 
-    /// A y = B u + C e, and without inputs A y = C e.
-    fn armax(&self) -> Option<Candidate> {
-        let Mixed { a, b, c } = self.equation().hannan_rissanen(self.orders.nc)?;
-        let found = Coefficients {
-            a: a[1..].to_vec(),
-            b,
-            c: c[1..].to_vec(),
-            d: vec![0.0; self.orders.nd],
-            f: self.unit_f(),
+    /// A y = B u + C e, and without inputs A y = C e: by a long ARX model; and A and B by least squares on y/C and u/C
+    /// for some given C, as the errors may have several minima over C.
+    fn armax(&self) -> Vec<Candidate> {
+        let (equation, nc) = (self.equation(), self.orders.nc);
+        let candidate = |name, Mixed { a, b, c }: Mixed| {
+            let (a, c) = (a[1..].to_vec(), c[1..].to_vec());
+            Coefficients { a, b, c, d: vec![0.0; self.orders.nd], f: self.unit_f() }.candidate(name, None)
         };
-        Some(found.candidate("hannan-rissanen", None))
+        let first = equation.hannan_rissanen(nc).map(|found| candidate("hannan-rissanen", found));
+        let Some(first) = first else { return Vec::new() };
+        let mut candidates = vec![first];
+        if nc == 0 {
+            return candidates;
+        }
+        for (name, [first, last]) in GIVEN {
+            if self.deadline.is_over() {
+                break;
+            }
+            let root = |k: usize| first + (last - first) * k as f64 / nc.max(2).saturating_sub(1) as f64;
+            let mut product = Vec::new();
+            multiply_out((0..nc).map(|k| Complex::new(root(k), 0.0)), &mut product);
+            let c: Vec<f64> = product.iter().map(|value| value.re).collect();
+            let noise = Mixed { a: vec![1.0], b: Vec::new(), c };
+            let output = self.whitened(&noise, self.output, self.segments);
+            let inputs = self.whitened_inputs(&noise);
+            let of_inputs = equation.inputs.iter().zip(&inputs);
+            let filtered = Equation {
+                output: &output,
+                inputs: of_inputs.map(|(input, signal)| Input { signal, ..input.clone() }).collect(),
+                ..equation.clone()
+            };
+            let found = filtered.least_squares();
+            candidates.extend(found.map(|found| candidate(name, Mixed { c: noise.c, ..found })));
+        }
+        candidates
     }
 
     /// A y = B u + C/D e by A and B that are consistent in noise of any colour, each improved by generalised least squares:

@@ -349,7 +349,12 @@ impl<'p, 'a> Point<'p, 'a> {
             let columns = |k: usize| if k < count { k } else { k + count };
             let matrix =
                 DMatrix::from_fn(size - count, size - count, |i, j| reduced.matrix[(rows(i), columns(j))]);
-            let step = inverse(&matrix)? * reduced.right.rows(count, size - count);
+            let square = |k: usize| reduced.matrix[(k, k)];
+            let squares: [Vec<f64>; 2] = [
+                (0..size - count).map(|i| square(rows(i))).collect(),
+                (0..size - count).map(|j| square(columns(j))).collect(),
+            ];
+            let step = inverse(&matrix, squares)? * reduced.right.rows(count, size - count);
             let square = reduced.matrix.view((count, count), (size - count, size - count)) * &step;
             (step.dot(&square), step)
         } else {
@@ -368,16 +373,19 @@ impl<'p, 'a> Point<'p, 'a> {
     }
 }
 
-/// A^-1 by way of A with rows and columns of unit norm. None if it is singular.
-pub(in crate::estimate) fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+/// (Z'X)^-1, by way of columns of Z and X of unit length, whatever their units: `squares` are those of the columns of
+/// Z, then of X. None if it is singular, as where a column is nothing but rounding.
+pub(in crate::estimate) fn inverse(matrix: &DMatrix<f64>, squares: [Vec<f64>; 2]) -> Option<DMatrix<f64>> {
+    if !squares.iter().flatten().all(|square| *square > 0.0) {
+        return None;
+    }
+    let [rows, columns] = squares.map(|squares| squares.into_iter().map(f64::sqrt).collect::<Vec<f64>>());
     let mut scaled = matrix.clone();
-    let rows: Vec<f64> = scaled.row_iter().map(|row| row.norm()).collect();
-    scaled.row_iter_mut().zip(&rows).for_each(|(mut row, norm)| row.unscale_mut(*norm));
-    let columns: Vec<f64> = scaled.column_iter().map(|column| column.norm()).collect();
-    scaled.column_iter_mut().zip(&columns).for_each(|(mut column, norm)| column.unscale_mut(*norm));
+    scaled.row_iter_mut().zip(&rows).for_each(|(mut row, length)| row.unscale_mut(*length));
+    scaled.column_iter_mut().zip(&columns).for_each(|(mut column, length)| column.unscale_mut(*length));
     let mut inverse = scaled.lu().try_inverse()?;
-    inverse.row_iter_mut().zip(&columns).for_each(|(mut row, norm)| row.unscale_mut(*norm));
-    inverse.column_iter_mut().zip(&rows).for_each(|(mut column, norm)| column.unscale_mut(*norm));
+    inverse.row_iter_mut().zip(&columns).for_each(|(mut row, length)| row.unscale_mut(*length));
+    inverse.column_iter_mut().zip(&rows).for_each(|(mut column, length)| column.unscale_mut(*length));
     inverse.iter().all(|entry| entry.is_finite()).then_some(inverse)
 }
 

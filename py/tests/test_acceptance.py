@@ -52,7 +52,7 @@ def test_every_reference_case(case: dict[str, Any]) -> None:
     rows = slice(case["rows"][0] - 1, case["rows"][1])
     options: th.FitOptions = {"estimate": rows, "initial": "zero" if np.any(nf) else "drop"}
     if nc or nd or np.any(nf):
-        options["tolerance"] = 1e-12
+        options["tolerance"] = 1e-14
     model = th.general(log, na, nb, nc, nd, nf, nk, **options)
     if case["file"] == "evaporator" and case["model"] == "oe":
         # The reference stopped at a minimum that is not the lowest.

@@ -57,6 +57,19 @@ pub trait Objective {
         0..0
     }
 
+    /// The normal equations of these alone, at the parameters evaluated last: writes their part of G, row by row, and of
+    /// g. What else [`linearize`](Self::linearize) forms need not be there afterwards.
+    fn linear_equations(&mut self, matrix: &mut [f64], right: &mut [f64]) -> Result<(), Self::Refusal> {
+        self.linearize()?;
+        let (size, linear) = (self.right().len(), self.linear());
+        let whole = self.matrix().chunks_exact(size.max(1)).skip(linear.start);
+        for (own, whole) in matrix.chunks_exact_mut(linear.len().max(1)).zip(whole) {
+            own.copy_from_slice(&whole[linear.clone()]);
+        }
+        right.copy_from_slice(&self.right()[linear]);
+        Ok(())
+    }
+
     /// Writes R and Q'e with psi = Q R, the free responses taken out, as exact as an orthogonal method, at the current
     /// point: a row of R and its number of Q'e, one row after the other. Says whether there is one: not where J is no
     /// sum of squares.

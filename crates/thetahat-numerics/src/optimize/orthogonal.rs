@@ -11,6 +11,9 @@ const SMALLEST_DAMPING: f64 = 1e-26;
 const LONGEST: f64 = 2.0;
 const FARTHEST: f64 = 12.0;
 
+/// Sets of held coordinates that are tried for each coordinate there is.
+const SETS: usize = 3;
+
 /// The linearised errors in the coordinates of a search, as a triangle with columns of length one.
 #[derive(Debug)]
 pub(super) struct Orthogonal {
@@ -25,6 +28,7 @@ pub(super) struct Orthogonal {
     /// them.
     limits: Vec<[f64; 2]>,
     held: Vec<bool>,
+    solved: Vec<f64>,
     /// Whether coordinates are others than the parameters.
     own: bool,
 }
@@ -42,6 +46,7 @@ impl Orthogonal {
             trial: line(),
             limits: vec![[f64::NEG_INFINITY, f64::INFINITY]; size],
             held: vec![false; size],
+            solved: line(),
             own: false,
         }
     }
@@ -97,22 +102,45 @@ impl Orthogonal {
         Some(self.predicted(1.0, step))
     }
 
-    /// The step of this damping within the limits: coordinates that would leave these are held there, and the others
-    /// solved for again.
+    /// The least squares of this damping within the limits, by active sets (Lawson and Hanson, Solving Least Squares
+    /// Problems, 1974, chapter 23; Stark and Parker, Computational Statistics 10, 1995): a step goes as far as the first
+    /// limit, that coordinate is held there, and is let go again where the others have changed what it wants.
     pub(super) fn solve_damped(&mut self, damping: f64, step: &mut [f64]) {
-        let Self { size, triangle, work, limits, held, .. } = self;
+        let Self { size, triangle, work, limits, held, solved, .. } = self;
+        let damping = damping.max(SMALLEST_DAMPING);
         held.fill(false);
-        loop {
-            solve_damped(triangle, held, damping.max(SMALLEST_DAMPING), work, step);
-            let mut left = false;
-            for place in 0..*size {
-                let within = step[place].clamp(limits[place][0], limits[place][1]);
-                if !held[place] && within != step[place] {
-                    (held[place], step[place], left) = (true, within, true);
+        step.fill(0.0);
+        for _ in 0..SETS * *size {
+            solved.copy_from_slice(step);
+            solve_damped(triangle, held, damping, work, solved);
+            // Which part of the way to its limit is within it.
+            let within = |place: usize, from: f64| {
+                let to = solved[place];
+                let limit = to.clamp(limits[place][0], limits[place][1]);
+                if to == limit { 1.0 } else { ((limit - from) / (to - from)).max(0.0) }
+            };
+            let part = (0..*size).map(|place| within(place, step[place])).fold(1.0, f64::min);
+            for (place, step) in step.iter_mut().enumerate() {
+                if part < 1.0 && within(place, *step) == part {
+                    (*step, held[place]) = (solved[place].clamp(limits[place][0], limits[place][1]), true);
+                } else {
+                    *step += part * (solved[place] - *step);
                 }
             }
-            if !left {
-                return;
+            if part < 1.0 {
+                continue;
+            }
+            // Of what is held, what wants to come back most.
+            let inward = |place: usize| {
+                let rows = triangle.chunks_exact(*size + 1);
+                let left = |row: &[f64]| row[*size] - product(&row[..*size], step);
+                let slope = rows.map(|row| row[place] * left(row)).sum::<f64>() - damping * step[place];
+                if step[place] >= limits[place][1] { -slope } else { slope }
+            };
+            let most = (0..*size).filter(|&place| held[place]).map(|place| (inward(place), place));
+            match most.max_by(|(one, _), (other, _)| one.total_cmp(other)) {
+                Some((inward, place)) if inward > 0.0 => held[place] = false,
+                _ => return,
             }
         }
     }
@@ -122,7 +150,7 @@ impl Orthogonal {
         let size = self.size;
         let rows = self.triangle.chunks_exact(size + 1);
         rows.map(|row| {
-            let moved = fraction * row[..size].iter().zip(step).map(|(t, s)| t * s).sum::<f64>();
+            let moved = fraction * product(&row[..size], step);
             moved * (2.0 * row[size] - moved)
         })
         .sum()
@@ -149,6 +177,10 @@ impl Orthogonal {
         }
         self.predicted(fraction, step)
     }
+}
+
+fn product(one: &[f64], other: &[f64]) -> f64 {
+    one.iter().zip(other).map(|(one, other)| one * other).sum()
 }
 
 /// Makes a matrix of `rows` rows of `columns` numbers and one more, the right-hand side, upper triangular by
@@ -238,6 +270,38 @@ mod tests {
         // Far more damping than there is in the columns: nothing moves.
         solve_damped(&matrix[..size * (size + 1)], &vec![false; size], 1e12, &mut work, &mut step);
         assert!(step.iter().all(|value| value.abs() < 1e-9), "{step:?}");
+    }
+
+    #[test]
+    fn a_step_within_limits_is_the_best_there_is() {
+        let (size, mut random) = (3, Random::of(5, 1));
+        for _ in 0..200 {
+            let mut orthogonal = Orthogonal::new(size);
+            for row in 0..size {
+                // Columns that are far from orthogonal: what is held changes what the others want.
+                (row..=size).for_each(|column| {
+                    orthogonal.triangle[row * (size + 1) + column] = random.normal() / (1 + 9 * row) as f64;
+                });
+            }
+            orthogonal.limits = (0..size).map(|_| [-random.normal().abs(), random.normal().abs()]).collect();
+            // Every set of held coordinates at every limit, of which the best that is within.
+            let (mut work, mut best) = (vec![0.0; 2 * size * (size + 1)], 0.0_f64);
+            for set in 0..27_usize {
+                let state = |place: usize| set / 3_usize.pow(place as u32) % 3;
+                let held: Vec<bool> = (0..size).map(|place| state(place) < 2).collect();
+                let limit = |place: usize| orthogonal.limits[place][state(place).min(1)];
+                let mut step: Vec<f64> = (0..size).map(limit).collect();
+                solve_damped(&orthogonal.triangle, &held, SMALLEST_DAMPING, &mut work, &mut step);
+                let mut each = step.iter().zip(&orthogonal.limits);
+                if each.all(|(step, [low, high])| (*low..=*high).contains(step)) {
+                    best = best.max(orthogonal.predicted(1.0, &step));
+                }
+            }
+            let mut step = vec![0.0; size];
+            orthogonal.solve_damped(0.0, &mut step);
+            let found = orthogonal.predicted(1.0, &step);
+            assert!((found - best).abs() <= 1e-9 * best, "{found} {best} {step:?}");
+        }
     }
 
     #[test]

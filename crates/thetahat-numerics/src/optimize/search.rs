@@ -4,7 +4,7 @@ use super::annealing::anneal;
 use super::objective::Objective;
 use super::options::{Algorithm, Search};
 use super::outcome::{Deadline, Found, Monitor, Progress, Stopped};
-use super::solved::{best_free, solve_linear};
+use super::solved::{best_free, solve_linear, solve_linear_here};
 use super::workspace::{LARGEST_DAMPING, SMALLEST_DAMPING, Workspace};
 use crate::Error;
 
@@ -146,6 +146,10 @@ pub fn search<O: Objective>(
             break Stopped::Converged;
         }
     };
+    // Trials that are solved for leave no normal equations behind.
+    if descent.workspace.orthogonal.is_some() {
+        let _ = descent.objective.linearize();
+    }
     let Descent { parameters, stability_bound, unstable_steps, .. } = descent;
     Ok(Ok(Found { parameters, costs, gradient_norm, stopped, stability_bound, unstable_steps }))
 }
@@ -332,6 +336,9 @@ impl<O: Objective> Descent<'_, O> {
             return cost;
         }
         let Workspace { trial, factor, moved, .. } = &mut self.workspace;
+        if cost.is_ok() {
+            return solve_linear_here(self.objective, trial, factor, moved);
+        }
         solve_linear(self.objective, trial, factor, moved)
     }
 

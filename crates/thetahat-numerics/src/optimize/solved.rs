@@ -30,16 +30,21 @@ pub(super) fn solve_linear<O: Objective>(
     step: &mut [f64],
 ) -> Result<f64, O::Refusal> {
     best_free(objective, parameters)?;
-    objective.linearize()?;
-    let (size, linear) = (parameters.len(), objective.linear());
+    solve_linear_here(objective, parameters, matrix, step)
+}
+
+/// The same where the parameters have been evaluated, with any free responses.
+pub(super) fn solve_linear_here<O: Objective>(
+    objective: &mut O,
+    parameters: &mut [f64],
+    matrix: &mut [f64],
+    step: &mut [f64],
+) -> Result<f64, O::Refusal> {
+    let linear = objective.linear();
     let count = linear.len();
     let matrix = &mut matrix[..count * count];
-    let whole = objective.matrix().chunks_exact(size).skip(linear.start);
-    for (own, whole) in matrix.chunks_exact_mut(count.max(1)).zip(whole) {
-        own.copy_from_slice(&whole[linear.clone()]);
-    }
     step.fill(0.0);
-    step[linear.clone()].copy_from_slice(&objective.right()[linear.clone()]);
+    objective.linear_equations(matrix, &mut step[linear.clone()])?;
     normal::factor(matrix, count);
     normal::solve(matrix, count, &mut step[linear]);
     parameters.iter_mut().zip(&*step).for_each(|(value, step)| *value += step);

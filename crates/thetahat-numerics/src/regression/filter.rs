@@ -33,7 +33,7 @@ pub fn divide_together<const K: usize>(monic: &[f64], signals: [&mut [f64]; K]) 
         [_, a, b] => divide_by(signals, [a, b]),
         [_, a, b, c] => divide_by(signals, [a, b, c]),
         [_, a, b, c, d] => divide_by(signals, [a, b, c, d]),
-        [_, ref weights @ ..] => signals.into_iter().for_each(|values| divide_from(weights, &[], values)),
+        [_, a, b, c, d, ref far @ ..] => divide_by_more(signals, [a, b, c, d], far),
     }
 }
 
@@ -58,18 +58,70 @@ fn divide_by<const K: usize, const N: usize>(mut signals: [&mut [f64]; K], weigh
     }
 }
 
+/// The same for more weights, those of lags beyond four in `far`: what is that long ago is in memory by then.
+fn divide_by_more<const K: usize>(mut signals: [&mut [f64]; K], near: [f64; 4], far: &[f64]) {
+    let length = signals.iter().map(|values| values.len()).min().unwrap_or(0);
+    let mut pasts = [[0.0; 4]; K];
+    for t in 0..length {
+        let end = t.saturating_sub(near.len());
+        let far = &far[..far.len().min(end)];
+        for (values, past) in signals.iter_mut().zip(&mut pasts) {
+            let mut sum = values[t];
+            for (weight, x) in far.iter().rev().zip(&values[end - far.len()..end]) {
+                sum -= weight * x;
+            }
+            for k in (0..near.len()).rev() {
+                sum -= near[k] * past[k];
+            }
+            *past = [sum, past[0], past[1], past[2]];
+            values[t] = sum;
+        }
+    }
+}
+
 /// x = w/A in place, `before` holding the x before the first, the latest last; what is not there is zero.
 pub fn divide_from(weights: &[f64], before: &[f64], values: &mut [f64]) {
     let order = weights.len();
     let start = order.min(values.len());
     for t in 0..start {
-        let earlier = values[..t].iter().rev().chain(before.iter().rev());
-        let sum: f64 = weights.iter().zip(earlier).map(|(a, x)| a * x).sum();
-        values[t] -= sum;
+        // x(t - 1 - k), the latest value last, as above.
+        let earlier =
+            |k: usize| if k < t { Some(&values[t - 1 - k]) } else { before.iter().rev().nth(k - t) };
+        let products = weights.iter().enumerate().rev().filter_map(|(k, a)| Some(a * earlier(k)?));
+        values[t] = products.fold(values[t], |sum, product| sum - product);
     }
     for t in start..values.len() {
-        let (earlier, now) = values.split_at_mut(t);
-        let sum: f64 = weights.iter().zip(earlier[t - order..].iter().rev()).map(|(a, x)| a * x).sum();
-        now[0] -= sum;
+        let earlier = weights.iter().rev().zip(&values[t - order..t]);
+        values[t] = earlier.fold(values[t], |sum, (a, x)| sum - a * x);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn a_quotient_times_its_divisor_is_the_dividend() {
+        let mut random = Random::of(2, 1);
+        for order in 0..9 {
+            let monic: Vec<f64> =
+                (0..=order).map(|k| if k == 0 { 1.0 } else { 0.2 * random.normal() / k as f64 }).collect();
+            for length in [0, 1, order, order + 1, 40] {
+                let values: Vec<f64> = (0..length).map(|_| random.normal()).collect();
+                let mut quotients = [values.clone(), values.iter().map(|value| -value).collect()];
+                let [one, other] = &mut quotients;
+                divide_together(&monic, [one, other]);
+                let mut from = values.clone();
+                divide_from(&monic[1..], &[], &mut from);
+                for (t, value) in values.iter().enumerate() {
+                    let known = monic.iter().zip(quotients[0][..=t].iter().rev());
+                    let again: f64 = known.map(|(weight, x)| weight * x).sum();
+                    assert!((again - value).abs() < 1e-13 * (1.0 + value.abs()));
+                    assert_eq!(quotients[0][t], -quotients[1][t]);
+                    assert!((from[t] - quotients[0][t]).abs() < 1e-13 * (1.0 + from[t].abs()));
+                }
+            }
+        }
     }
 }

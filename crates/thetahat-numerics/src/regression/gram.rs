@@ -66,7 +66,7 @@ impl Diagonal {
 /// Which products of lagged signals there are: those of all lags of the taps, and of the target `signals[0](t)`.
 ///
 /// A plan, made once; sums over it take no memory of their own.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Products {
     spans: Vec<Span>,
     diagonals: Vec<Diagonal>,

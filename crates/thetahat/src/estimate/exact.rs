@@ -55,6 +55,8 @@ use likelihood::{InitialCondition, Likelihood};
 
 /// Starts have roots of A and C inside this circle.
 const INSIDE: f64 = 0.99;
+/// How often a search goes on from there.
+const AGAIN: usize = 3;
 
 /// How an estimate of largest exact likelihood was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -262,9 +264,7 @@ impl<'r> Job<'_, 'r> {
         for (number, (name, start)) in starts.iter().enumerate() {
             let mut likelihood = Likelihood::new(self.record, self.orders, self.lines, begin);
             let samples = likelihood.samples() as f64;
-            let found =
-                search(&mut likelihood, start, self.options, self.smallest, self.deadline, self.monitor)?
-                    .ok();
+            let found = self.search(&mut likelihood, start)?;
             outcomes.push(StartOutcome {
                 name: (*name).to_owned(),
                 cost: found.as_ref().map(|found| found.costs[0] / samples),
@@ -279,6 +279,33 @@ impl<'r> Job<'_, 'r> {
         }
         outcomes.swap(0, winner);
         Ok(best.map(|best| Reached { starts: outcomes, ..best }))
+    }
+
+    /// A search that ends at the border of stability goes on from inside of it as long as that leads below.
+    fn search(&self, likelihood: &mut Likelihood<'r>, start: &[f64]) -> Result<Option<Found>, Error> {
+        let mut search = |start: &[f64]| {
+            search(likelihood, start, self.options, self.smallest, self.deadline, self.monitor)
+        };
+        let Ok(mut found) = search(start)? else { return Ok(None) };
+        for _ in 0..AGAIN {
+            if found.stopped != Stopped::NoDescent || self.deadline.is_over() {
+                break;
+            }
+            let mut polynomials = Polynomials::new(self.orders, &found.parameters);
+            drawn_in(&mut polynomials.a);
+            drawn_in(&mut polynomials.c);
+            match search(&polynomials.parameters())? {
+                Ok(again) if again.cost() < found.cost() => {
+                    let costs = [&found.costs[..], &[again.cost()]].concat();
+                    found = Found { costs, ..again };
+                }
+                _ => {
+                    let _ = best_free(likelihood, &found.parameters);
+                    break;
+                }
+            }
+        }
+        Ok(Some(found))
     }
 
     /// At rest, or from a state that is estimated where that is worth it.

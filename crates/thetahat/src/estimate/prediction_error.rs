@@ -176,7 +176,7 @@ impl Job<'_> {
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
     ///
     /// A search that is not soon at its end may be on the way to a minimum of its own: then starts from nested models are
-    /// compared with what it found.
+    /// compared with what it found, and always where these models are few.
     fn search_from(
         &self,
         data: &impl ExperimentData,
@@ -189,8 +189,10 @@ impl Job<'_> {
             Some(found) => Some(found.clone()),
             None => self.search(predictor, &beginning.parameters, beginning.orthogonal)?.ok(),
         };
-        let easy =
-            |found: &Found| found.stopped == Stopped::Converged && found.costs.len() <= EASY_ITERATIONS + 1;
+        let easy = |found: &Found| {
+            let soon = found.stopped == Stopped::Converged && found.costs.len() <= EASY_ITERATIONS + 1;
+            soon && !nested::are_few(orders)
+        };
         if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
             beginning.compared = true;
             let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);

@@ -60,9 +60,11 @@ use section::Section;
 const PARALLEL_FROM: usize = 1 << 15;
 
 /// Which signals there are, and which columns of psi are made of them.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Layout {
     orders: Orders,
+    /// That of the parameters alone that errors are linear in, A and B; none in that itself.
+    linear: Option<Box<Layout>>,
     /// Those of the parameters in their order, then of the initial-condition responses, then of g. Signal 0 is e.
     taps: Vec<Taps>,
     /// Signal, position among the products, lag and sign, one for each column.
@@ -165,33 +167,19 @@ impl Layout {
         taps.extend(f.map(|(&signal, &count)| Taps { signal, first: 1, count, sign: -1.0 }));
         let zero = frees.iter().zip(&own_free);
         taps.extend(zero.map(|(&signal, &count)| Taps { signal, first: 0, count, sign: 1.0 }));
-        let used = taps.iter().filter(|taps| taps.count > 0);
-        let longest = used.map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
-        let corrections = if conditioned > 0 { longest } else { 0 };
-        taps.push(Taps { signal: impulse, first: 0, count: corrections, sign: 1.0 });
-        let products = Products::new(&taps);
-        let columns = taps.iter().flat_map(|taps| {
-            let products = &products;
-            (0..taps.count).map(move |i| {
-                let (signal, lag) = (taps.signal, taps.first + i);
-                Column { signal, position: products.position(signal, lag), lag, sign: taps.sign }
-            })
-        });
-        let used = |signal: &usize| taps.iter().any(|taps| taps.signal == *signal && taps.count > 0);
-        let all = || std::iter::once(output).chain(own.iter().chain(&responses).copied());
-        let filtered = all().chain([error, disturbance]).filter(used).collect();
-        Self {
-            filtered,
-            with_noise_denominator: all().filter(used).collect(),
-            columns: columns.collect(),
+        let mut all = Self {
+            linear: None,
+            filtered: Vec::new(),
+            with_noise_denominator: Vec::new(),
+            columns: Vec::new(),
             parameters: orders.parameters(),
             free: own_free.iter().sum(),
             faded: counted > skipped && own_free.iter().any(|&free| free > 0),
             own_free,
             origin,
             orders: orders.clone(),
-            taps,
-            products,
+            taps: Vec::new(),
+            products: Products::new(&[]),
             conditioned,
             counted,
             bound: None,
@@ -203,7 +191,50 @@ impl Layout {
             frees,
             impulse,
             signals,
-        }
+        };
+        let linear = |taps: &Taps| {
+            let nonlinear =
+                all.responses.contains(&taps.signal) || [error, disturbance].contains(&taps.signal);
+            Taps { count: if nonlinear { 0 } else { taps.count }, ..*taps }
+        };
+        let mut of_linear = Self { parameters: orders.na + orders.nb.iter().sum::<usize>(), ..all.clone() };
+        of_linear.lay_out(taps.iter().map(linear).collect());
+        all.linear = Some(Box::new(of_linear));
+        all.lay_out(taps);
+        all
+    }
+
+    /// Makes columns of taps, and of shifts of g as many as these need.
+    fn lay_out(&mut self, mut taps: Vec<Taps>) {
+        let used = taps.iter().filter(|taps| taps.count > 0);
+        let longest = used.map(|taps| taps.first + taps.count - 1).max().unwrap_or(0);
+        let corrections = if self.conditioned > 0 { longest } else { 0 };
+        taps.push(Taps { signal: self.impulse, first: 0, count: corrections, sign: 1.0 });
+        let products = Products::new(&taps);
+        let columns = taps.iter().flat_map(|taps| {
+            let products = &products;
+            (0..taps.count).map(move |i| {
+                let (signal, lag) = (taps.signal, taps.first + i);
+                Column { signal, position: products.position(signal, lag), lag, sign: taps.sign }
+            })
+        });
+        self.columns = columns.collect();
+        (self.products, self.taps) = (products, taps);
+        let all = || std::iter::once(self.output).chain(self.inputs.iter().chain(&self.responses).copied());
+        let used = |signal: &usize| self.uses(*signal);
+        let filtered = all().chain([self.error, self.disturbance]).filter(used).collect();
+        self.with_noise_denominator = all().filter(used).collect();
+        self.filtered = filtered;
+    }
+
+    /// Whether there are columns of a signal.
+    fn uses(&self, signal: usize) -> bool {
+        self.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
+    }
+
+    /// That of the parameters alone that errors are linear in.
+    fn linear(&self) -> &Self {
+        self.linear.as_deref().unwrap_or(self)
     }
 }
 
@@ -438,23 +469,37 @@ impl<'a> Predictor<'a> {
     /// Takes what was evaluated last as the current point, and forms the normal equations there. Gives by how much the
     /// initial-condition responses alone can lower the cost.
     pub(super) fn linearize(&mut self) -> f64 {
-        let (layouts, polynomials) = (&self.layouts, &self.polynomials);
-        let each = |section: &mut Section<'_>| {
-            let layout = &layouts[section.layout];
-            section.free.copy_from_slice(&section.trial);
-            section.linearize(layout, polynomials);
-        };
-        if self.sections.len() > 1 && self.samples >= PARALLEL_FROM {
-            self.sections.par_iter_mut().for_each(each);
-        } else {
-            self.sections.iter_mut().for_each(each);
-        }
+        self.linearize_sections(false);
         self.matrix.fill(0.0);
         self.right.fill(0.0);
         for section in &self.sections {
             section.add_normal(&self.layouts[section.layout], &mut self.matrix, &mut self.right);
         }
         self.free_gain()
+    }
+
+    /// The same for the parameters alone that errors are linear in: writes their part.
+    fn write_linear_equations(&mut self, matrix: &mut [f64], right: &mut [f64]) {
+        self.linearize_sections(true);
+        matrix.fill(0.0);
+        right.fill(0.0);
+        for section in &self.sections {
+            section.add_normal(self.layouts[section.layout].linear(), matrix, right);
+        }
+    }
+
+    fn linearize_sections(&mut self, linear: bool) {
+        let (layouts, polynomials) = (&self.layouts, &self.polynomials);
+        let each = |section: &mut Section<'_>| {
+            let layout = &layouts[section.layout];
+            section.free.copy_from_slice(&section.trial);
+            section.linearize(if linear { layout.linear() } else { layout }, polynomials);
+        };
+        if self.sections.len() > 1 && self.samples >= PARALLEL_FROM {
+            self.sections.par_iter_mut().for_each(each);
+        } else {
+            self.sections.iter_mut().for_each(each);
+        }
     }
 
     /// The errors that count, and the segments of them that follow one another.
@@ -566,11 +611,12 @@ impl<'a> Predictor<'a> {
             own.clear();
             for run in &section.runs {
                 for from in run.clone().step_by(Folding::ROWS) {
-                    own.fold(Folding::ROWS.min(run.end - from), |column, values| {
-                        for (value, row) in values.iter_mut().zip(from..) {
-                            let root = |bound| loss::weight(section.signals[0][row], bound).sqrt();
-                            *value =
-                                layout.bound.map_or(1.0, root) * section.sensitivity(layout, row, column);
+                    let rows = from..run.end.min(from + Folding::ROWS);
+                    own.fold(rows.len(), |column, values| {
+                        section.write_column(layout, &rows, column, values);
+                        let Some(bound) = layout.bound else { return };
+                        for (value, e) in values.iter_mut().zip(&section.signals[0][rows.clone()]) {
+                            *value *= loss::weight(*e, bound).sqrt();
                         }
                     });
                 }

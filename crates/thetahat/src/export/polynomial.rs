@@ -15,9 +15,6 @@ use super::{Form, Purpose, refused};
 use crate::Error;
 use crate::model::{Model, PolynomialModel};
 
-/// So many weights are subtracted one after the other by [`divide`](thetahat_numerics::regression); of more the sum is.
-const ONE_BY_ONE: usize = 4;
-
 /// The program of a model.
 ///
 /// # Errors
@@ -87,18 +84,7 @@ impl Filter {
     /// `sum -= sum_i weight_i value_i`, as the library divides by a polynomial.
     fn subtract(&self, program: &mut Program, sum: Variable) -> Vec<Statement> {
         let count = program.length(self.weights);
-        if count <= ONE_BY_ONE {
-            return program.repeat(count, |_, i| vec![Statement::Set(sum, sum - self.product(&i))]);
-        }
-        let past = program.variable("past");
-        let mut statements = vec![Statement::Let(past, self.product(&(count - 1).into()))];
-        statements.extend(program.repeat(count - 1, |_, i| {
-            let index =
-                Index { constant: count - 2, terms: i.terms.into_iter().map(|(i, _)| (i, -1)).collect() };
-            vec![Statement::Set(past, past + self.product(&index))]
-        }));
-        statements.push(Statement::Set(sum, sum - past));
-        statements
+        program.repeat(count, |_, i| vec![Statement::Set(sum, sum - self.product(&i))])
     }
 }
 

@@ -27,6 +27,8 @@ const SAME_COST: f64 = 1e-6;
 const TOLERANCE: f64 = 1e-5;
 /// Models of a lattice at most.
 const MOST_MODELS: usize = 96;
+/// So few of them cost little.
+const FEW_MODELS: usize = 9;
 /// Of a longer record the smaller models see segments.
 const LONG: usize = 1 << 12;
 const SEGMENTS: usize = 4;
@@ -131,10 +133,8 @@ fn bottom(top: &Levels) -> Levels {
     let depth = |depth: usize| -> Levels {
         std::array::from_fn(|k| top[k].saturating_sub(depth).max(least[k].min(top[k])))
     };
-    let models =
-        |bottom: &Levels| top.iter().zip(bottom).map(|(top, bottom)| top - bottom + 1).product::<usize>();
     let deepest = top.iter().copied().max().unwrap_or(0);
-    (0..=deepest).rev().map(depth).find(|bottom| models(bottom) <= MOST_MODELS).unwrap_or(*top)
+    (0..=deepest).rev().map(depth).find(|bottom| count(top, bottom) <= MOST_MODELS).unwrap_or(*top)
 }
 
 /// The next levels, the last one counted up first.
@@ -148,6 +148,17 @@ fn following(at: &Levels, bottom: &Levels, top: &Levels) -> Option<Levels> {
         next[k] = bottom[k];
     }
     None
+}
+
+/// Whether the models below one are so few that a search of each costs little.
+pub(super) fn are_few(orders: &Orders) -> bool {
+    let top = levels(orders);
+    count(&top, &bottom(&top)) <= FEW_MODELS
+}
+
+/// The models of a lattice.
+fn count(top: &Levels, bottom: &Levels) -> usize {
+    top.iter().zip(bottom).map(|(top, bottom)| top - bottom + 1).product()
 }
 
 /// The levels with one coefficient fewer.

@@ -81,7 +81,7 @@ impl Job<'_> {
         // What was given and costs least comes from a search.
         let several = self.options.starts > 0;
         let known = !several && starts.first().is_some_and(|start| start.outcome.name == GIVEN);
-        let mut compared = !has_f || !default || known || several;
+        let mut compared = !has_f || !default || several;
         let may_compare = (has_f || starts.len() > 1) && default && !known && !self.deadline.is_over();
         let doubtful = may_compare && is_doubtful(problem, &starts, predictor);
         if doubtful || may_compare && several {

@@ -36,15 +36,10 @@ impl Section<'_> {
     /// The columns of the parameters, then of the initial-condition responses, from the first sample that may count on; zero where one does not.
     pub(super) fn raw_columns(&self, layout: &Layout) -> Vec<Vec<f64>> {
         let count = layout.parameters + layout.free;
-        let (columns, shifts) = layout.columns.split_at(count);
         let rows = layout.counted..self.output.len();
-        let column = |(index, column): (usize, &super::Column)| {
+        let column = |index: usize| {
             let mut values = vec![0.0; rows.len()];
-            add_shifted(&mut values, &rows, column.sign, &self.signals[column.signal], column.lag);
-            let weights = &self.corrections[index * shifts.len()..][..shifts.len()];
-            for (shift, weight) in shifts.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
-                add_shifted(&mut values, &rows, *weight, &self.signals[shift.signal], shift.lag);
-            }
+            self.write_raw(layout, &rows, index, &mut values);
             let starts = std::iter::once(rows.start).chain(self.runs.iter().map(|run| run.end));
             let ends = self.runs.iter().map(|run| run.start).chain([rows.end]);
             for (start, end) in starts.zip(ends) {
@@ -52,7 +47,37 @@ impl Section<'_> {
             }
             values
         };
-        columns.iter().enumerate().map(column).collect()
+        (0..count).map(column).collect()
+    }
+
+    /// Some rows of a column: first of those of the initial-condition responses, then of those of psi, and e last.
+    pub(super) fn write_column(
+        &self,
+        layout: &Layout,
+        rows: &Range<usize>,
+        column: usize,
+        values: &mut [f64],
+    ) {
+        let (parameters, free) = (layout.parameters, layout.free);
+        if column == parameters + free {
+            values.copy_from_slice(&self.signals[0][rows.clone()]);
+        } else {
+            let index = if column < free { parameters + column } else { column - free };
+            self.write_raw(layout, rows, index, values);
+        }
+    }
+
+    /// Some rows of a column, in the order of the layout.
+    fn write_raw(&self, layout: &Layout, rows: &Range<usize>, index: usize, values: &mut [f64]) {
+        let (columns, shifts) = layout.columns.split_at(layout.parameters + layout.free);
+        let column = &columns[index];
+        values.fill(0.0);
+        add_shifted(values, rows, column.sign, &self.signals[column.signal], column.lag);
+        let weights = &self.corrections[index * shifts.len()..][..shifts.len()];
+        for (shift, weight) in shifts.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+            let known = rows.start..rows.end.min(self.supports[shift.signal].saturating_add(shift.lag));
+            add_shifted(values, &known, *weight, &self.signals[shift.signal], shift.lag);
+        }
     }
 }
 

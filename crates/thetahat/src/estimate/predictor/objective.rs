@@ -65,6 +65,11 @@ impl Objective for Predictor<'_> {
         &self.right
     }
 
+    fn linear_equations(&mut self, matrix: &mut [f64], right: &mut [f64]) -> Result<(), Unusable> {
+        self.write_linear_equations(matrix, right);
+        Ok(())
+    }
+
     fn triangle(&mut self, into: &mut [f64]) -> bool {
         self.write_triangle(into);
         true

@@ -41,7 +41,8 @@ pub(super) struct Section<'a> {
     pub(super) scratch: Vec<f64>,
     /// What the mask cuts off each signal, r values each.
     pub(super) heads: Vec<f64>,
-    pub(super) interior: Interior,
+    /// For all parameters, and for those that errors are linear in.
+    pub(super) interiors: [Interior; 2],
     pub(super) entries: Vec<f64>,
     /// The Gram matrix of the parameters' and initial-condition responses' columns, row by row, and psi'e.
     pub(super) gram: Vec<f64>,
@@ -99,7 +100,7 @@ impl<'a> Section<'a> {
             disturbance: buffer(layout.orders.nd > 0),
             scratch: buffer(layout.orders.nd > 0),
             heads: vec![0.0; layout.signals * layout.conditioned],
-            interior: layout.products.interior(counted),
+            interiors: [layout, layout.linear()].map(|layout| layout.products.interior(counted.clone())),
             entries: vec![0.0; size * size],
             gram: vec![0.0; columns * columns],
             right: vec![0.0; columns],
@@ -226,12 +227,16 @@ impl<'a> Section<'a> {
             if orders.nf[j] > 0 {
                 let two = [layout.inputs[j], layout.responses[j]];
                 if let Ok([u, x]) = self.signals.get_disjoint_mut(two) {
-                    x.clone_from(&self.responses[j]);
-                    divide_together(&polynomials.f[j], [u, x]);
+                    if layout.uses(layout.responses[j]) {
+                        x.clone_from(&self.responses[j]);
+                        divide_together(&polynomials.f[j], [u, x]);
+                    } else {
+                        divide(&polynomials.f[j], u);
+                    }
                 }
             }
         }
-        if orders.nc > 0 {
+        if layout.uses(layout.error) {
             let (error, others) = self.signals.split_at_mut(1);
             others[layout.error - 1].clone_from(&error[0]);
         }
@@ -240,7 +245,9 @@ impl<'a> Section<'a> {
                 multiply(&mut self.scratch, &polynomials.d, &self.signals[signal]);
                 std::mem::swap(&mut self.scratch, &mut self.signals[signal]);
             }
-            self.signals[layout.disturbance].clone_from(&self.disturbance);
+            if layout.uses(layout.disturbance) {
+                self.signals[layout.disturbance].clone_from(&self.disturbance);
+            }
         }
         for &signal in &layout.filtered {
             let head = &mut self.signals[signal][..layout.conditioned];
@@ -260,7 +267,7 @@ impl<'a> Section<'a> {
                 self.free_floors[own].fill(UNSEEN * gain * gain * size);
             }
         }
-        if !self.signals[layout.impulse].is_empty() {
+        if layout.uses(layout.impulse) {
             self.respond(layout, polynomials, layout.impulse, None);
         }
         self.add_up(layout);
@@ -317,18 +324,21 @@ impl<'a> Section<'a> {
     /// The Gram matrix of the columns and psi'e.
     fn add_up(&mut self, layout: &Layout) {
         let (products, conditioned) = (&layout.products, layout.conditioned);
-        self.entries.fill(0.0);
-        for run in &self.runs {
-            products.add_ends(&self.signals, conditioned, run, &mut self.entries);
-        }
-        products.add_interior(&self.signals, &self.supports, &mut self.interior, &mut self.entries);
         let size = products.size();
+        let entries = &mut self.entries[..size * size];
+        entries.fill(0.0);
+        for run in &self.runs {
+            products.add_ends(&self.signals, conditioned, run, entries);
+        }
+        let interior = &mut self.interiors[usize::from(layout.linear.is_none())];
+        products.add_interior(&self.signals, &self.supports, interior, entries);
+        let entries = &self.entries[..size * size];
         let entry = |a: &Column, b: &Column| {
             let (low, high) = (a.position.min(b.position), a.position.max(b.position));
-            a.sign * b.sign * self.entries[low * size + high]
+            a.sign * b.sign * entries[low * size + high]
         };
         let error = Column { signal: 0, position: products.position(0, 0), lag: 0, sign: 1.0 };
-        let count = self.right.len();
+        let count = layout.parameters + layout.free;
         let (columns, shifts) = layout.columns.split_at(count);
         for (row, column) in columns.iter().enumerate() {
             self.right[row] = entry(column, &error);
@@ -336,7 +346,7 @@ impl<'a> Section<'a> {
                 *place = entry(column, other);
             }
         }
-        if conditioned > 0 {
+        if !shifts.is_empty() {
             let width = shifts.len();
             for (weights, column) in self.corrections.chunks_exact_mut(width).zip(columns) {
                 let head = &self.heads[column.signal * conditioned..][..conditioned];
@@ -385,16 +395,18 @@ impl<'a> Section<'a> {
             }
         }
         normal::factor(&mut self.free_factor, free);
-        for (which, steps) in self.free_steps.chunks_exact_mut(free.max(1)).enumerate() {
+        let all = self.free_steps.chunks_exact_mut(free.max(1)).take(1 + parameters);
+        for (which, steps) in all.enumerate() {
             if which == 0 {
-                steps.copy_from_slice(&self.right[parameters..]);
+                steps.copy_from_slice(&self.right[parameters..count]);
             } else {
                 steps.copy_from_slice(&self.gram[(which - 1) * count + parameters..][..free]);
             }
             normal::solve(&self.free_factor, free, steps);
         }
         let best = &self.free_steps[..free];
-        self.free_gain = best.iter().zip(&self.right[parameters..]).map(|(step, right)| step * right).sum();
+        self.free_gain =
+            best.iter().zip(&self.right[parameters..count]).map(|(step, right)| step * right).sum();
     }
 
     /// A sample of a column: first of those of the initial-condition responses, then of those of psi, and e last.

@@ -244,6 +244,52 @@ fn gradients_and_gram_matrices_are_those_of_central_differences() {
 }
 
 #[test]
+fn what_is_formed_of_a_and_b_alone_is_a_part_of_all() {
+    let mut noise = Noise(5);
+    for _ in 0..60 {
+        let (orders, parameters) = random(&mut noise);
+        let y = output(&orders, &mut noise);
+        let u: Vec<Vec<f64>> = orders.nb.iter().map(|_| noise.take(140)).collect();
+        let record = record(&y, &u);
+        for (mut predictor, bound) in
+            predictors(&record, &orders).into_iter().zip([None, Some(0.5)].into_iter().cycle())
+        {
+            predictor.count_linearly_from(bound);
+            let Ok(cost) = predictor.evaluate(&parameters) else { continue };
+            predictor.linearize();
+            let (whole, gradient) = (predictor.matrix.clone(), predictor.right.clone());
+            let (size, count) = (gradient.len(), orders.na + orders.nb.iter().sum::<usize>());
+            let lengths: Vec<f64> =
+                (0..size).map(|column| predictor.square_of(column).max(1.0).sqrt()).collect();
+            let (mut matrix, mut right) = (vec![0.0; count * count], vec![0.0; count]);
+            // The weights of the responses are those of the point, not those of a trial.
+            predictor.keep_free();
+            predictor.write_linear_equations(&mut matrix, &mut right);
+            // What is left of responses that have faded is rounding; others may be nearly dependent.
+            if predictor.layouts.iter().any(|layout| layout.faded) {
+                continue;
+            }
+            let rounding = 1e-8;
+            for row in 0..count {
+                let difference = right[row] - gradient[row];
+                assert!(
+                    difference.abs() < rounding * lengths[row] * cost.max(1.0).sqrt(),
+                    "{orders:?} {difference}"
+                );
+                for column in 0..count {
+                    let difference = matrix[row * count + column] - whole[row * size + column];
+                    let lengths = lengths[row] * lengths[column];
+                    assert!(difference.abs() < rounding * lengths, "{orders:?} {difference} of {lengths}");
+                }
+            }
+            // And the equations of all are what they were.
+            predictor.linearize();
+            assert_eq!((predictor.matrix, predictor.right), (whole, gradient));
+        }
+    }
+}
+
+#[test]
 fn taking_out_the_free_responses_leaves_the_normal_equations_of_their_best_weights() {
     let mut noise = Noise(3);
     let orders = Orders::bj(&[2], 1, 1, &[2], &[1]).unwrap();

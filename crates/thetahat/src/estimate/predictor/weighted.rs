@@ -11,7 +11,10 @@ impl Predictor<'_> {
     /// Lets errors count linearly from a bound on: the cost is 2 sum rho(e), rho(e) = e^2/2 up to the bound d and
     /// d |e| - d^2/2 beyond, and the normal equations have the weights min(1, d/|e|). None: by their squares all of them.
     pub(in crate::estimate) fn count_linearly_from(&mut self, bound: Option<f64>) {
-        self.layouts.iter_mut().for_each(|layout| layout.bound = bound);
+        for layout in &mut self.layouts {
+            layout.bound = bound;
+            layout.linear.iter_mut().for_each(|linear| linear.bound = bound);
+        }
     }
 }
 

@@ -72,6 +72,36 @@ fn the_largest_error_is_the_least_possible() {
 }
 
 #[test]
+fn the_largest_error_of_a_free_run_is_the_least_possible() {
+    let folder = folder(0.0);
+    let (u, y) = first_order(0.0);
+    let options =
+        "log.csv --model oe --nb 1 --nf 1 --detrend none --constant no --initial zero --sample-time 1";
+    let largest = |[b, f]: [f64; 2]| {
+        let mut x = 0.0;
+        let errors = u.iter().zip(&y).scan(0.0, |before, (u, y)| {
+            x = b * *before - f * x;
+            *before = *u;
+            Some((y - x).abs())
+        });
+        errors.fold(0.0, f64::max)
+    };
+    let report = folder.fit(&format!("{options} --norm inf"));
+    let best: [f64; 2] = parameters(&report).try_into().unwrap();
+    let least = largest(best);
+    assert!((number(&report, "/estimation/objective") / least - 1.0).abs() < 1e-9);
+    assert_eq!(report["estimation"]["search"]["stopped"], "converged");
+    for change in [[1e-5, 0.0], [-1e-5, 0.0], [0.0, 1e-5], [0.0, -1e-5], [1e-5, 1e-5], [1e-5, -1e-5]] {
+        assert!(largest([best[0] + change[0], best[1] + change[1]]) > least, "{change:?}");
+    }
+    let squares = largest(parameters(&folder.fit(options)).try_into().unwrap());
+    assert!(least < squares && (number(&report, "/estimation/search/costs/0") / squares - 1.0).abs() < 1e-3);
+    let table = folder.done(&format!("fit {options} --norm inf")).stdout;
+    assert!(table.contains("\ncriterion: largest absolute error "), "{table}");
+    assert!(table.contains("\nlinear programs, ") && table.contains(" from least squares ("), "{table}");
+}
+
+#[test]
 fn bounds_are_kept_and_named_where_they_matter() {
     let folder = folder(0.0);
     let report = folder.fit(&format!("{FIT} --bound a1=-0.7..0 --bound b1=0..10"));
@@ -173,8 +203,8 @@ fn instrumental_variables_are_not_misled_by_coloured_noise() {
 fn criteria_that_do_not_go_with_the_model_or_the_method() {
     let folder = Folder::new();
     for (options, parts) in [
-        ("--model oe --nb 2 --nf 2 --norm inf", &["--norm", "not linear", "--norm huber"][..]),
-        ("--model oe --nb 2 --nf 2 --norm 1 --ridge 2", &["--ridge", "not linear"]),
+        ("--model oe --nb 2 --nf 2 --norm 1 --ridge 2", &["--ridge", "not linear"][..]),
+        ("--model oe --nb 2 --nf 2 --norm inf --noise-bound 2", &["--noise-bound", "not linear"]),
         ("--na 2 --nb 2 --norm huber --ridge 2", &["--ridge", "goes with --norm 2, 1 and inf"]),
         ("--na 2 --nb 2 --norm huber:0", &["--norm", "huber:K"]),
         ("--na 2 --nb 2 --norm 3", &["--norm", "huber:K"]),

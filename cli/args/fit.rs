@@ -381,8 +381,8 @@ pub(crate) struct SearchArguments {
 #[command(next_help_heading = "Criterion (all but --norm for models without C, D and F)")]
 pub(crate) struct CriterionArguments {
     /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber[:K], of squares
-    /// up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not said); inf, the largest error, for
-    /// models without C, D and F [default: 2]
+    /// up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not said); inf, the largest error
+    /// [default: 2]
     #[arg(long, value_name = "2|1|huber[:K]|inf", allow_hyphen_values = true)]
     pub(crate) norm: Option<String>,
     /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)

@@ -308,7 +308,17 @@ fn criterion(text: &mut Text, outcome: &ConvexOutcome, model: &PolynomialModel, 
         Norm::Infinity => "largest absolute error",
     };
     let ridge = if outcome.ridge > 0.0 { format!(", ridge {}", short(outcome.ridge)) } else { String::new() };
-    text.line(&format!("criterion: {norm} {}{ridge}, {}", number(outcome.objective), initial(start, 0)));
+    let conditions = outcome.search.as_ref().map_or(0, |search| search.initial_conditions);
+    let start = initial(start, conditions);
+    text.line(&format!("criterion: {norm} {}{ridge}, {start}", number(outcome.objective)));
+    if let Some(search) = &outcome.search {
+        text.line(&format!(
+            "linear programs, {} from least squares ({}), {}",
+            counted(search.costs.len().saturating_sub(1)),
+            or_dash(search.costs.first().copied(), number),
+            stopped(search.stopped)
+        ));
+    }
     if !outcome.active.is_empty() {
         text.line(&format!("at a bound: {}", some(&outcome.active, MOST, ", ")));
     }

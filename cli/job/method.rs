@@ -1,4 +1,5 @@
 use thetahat::estimate::{ConvexFit, Kernel, Loss, Method, Norm, Robust};
+use thetahat::optimize::Search;
 
 use super::orders::OrderJob;
 use super::{parsed, positive, search};
@@ -53,12 +54,6 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
         }
         _ => Ok(()),
     }?;
-    if !orders.is_linear() && norm == Asked::Convex(Norm::Infinity) {
-        return Err(Failure::usage(
-            "--norm inf is for models without C, D and F: this one is not linear in its parameters, and the criterion not \
-             convex; use --norm 1 or --norm huber",
-        ));
-    }
     match self::given(of_criterion) {
         Some(option) if !orders.is_linear() => {
             refused(option, "is for models without C, D and F; this one is not linear in its parameters")
@@ -85,7 +80,8 @@ pub(super) fn method(arguments: &FitArguments, orders: &OrderJob) -> Result<Meth
             if criterion.is_plain() {
                 return Ok(Method::PredictionError(search::search(of_search)?));
             }
-            Ok(Method::Constrained(criterion))
+            let search = if orders.is_linear() { Search::default() } else { search::search(of_search)? };
+            Ok(Method::Constrained(ConvexFit { search, ..criterion }))
         }
     }
 }
@@ -177,5 +173,6 @@ fn criterion(arguments: &CriterionArguments, norm: Norm) -> Result<ConvexFit, Fa
         bounds: bounds.collect::<Result<_, _>>()?,
         dc_gain: gains.collect::<Result<_, _>>()?,
         noise_bound: positive("--noise-bound", arguments.noise_bound)?,
+        search: Search::default(),
     })
 }

@@ -120,6 +120,8 @@ def test_options_reach_the_engine(log: th.Log) -> None:
     for norm, k in (("huber", 1.345), ("huber:2", 2.0), (1, None)):
         robust = th.oe(log, 2, 2, norm=norm).document["estimation"]
         assert (robust["method"], robust.get("k")) == ("robust", k)
+    largest = th.oe(log, 2, 2, norm="inf").document["estimation"]
+    assert largest["norm"] == "inf" and largest["objective"] == largest["search"]["costs"][-1]
     for band, ends in (((0.01, 0.4), (0.01, 0.4)), ("..0.4", (None, 0.4)), ((0.01, None), (0.01, None))):
         assert th.oe(log, 2, 2, prefilter=band).document["data"]["prefilter"] == dict(zip(("low", "high"), ends))
     search = th.oe(log, 2, 2, search="gauss-newton", max_iterations=50, starts=2, seed=7, tolerance=1e-10)
@@ -179,7 +181,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, constant="yes", initial="zero"), ValueError, "constant"),
     (lambda log: th.arx(log, 2, 2, trend=1), TypeError, "trend: expected True or False"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, norm=3), ValueError, "norm"),
-    (lambda log: th.oe(log, 2, 2, norm="inf"), ValueError, "norm inf is for models without C, D and F"),
+    (lambda log: th.oe(log, 2, 2, norm="infinity"), ValueError, "norm infinity: give 2, 1, huber"),
     (lambda log: th.oe(log, 2, 2, prefilter="0.4"), ValueError, "prefilter: '0.4' is no band"),
     (lambda log: th.oe(log, 2, 2, prefilter=(0.1, 0.6)), ValueError, "prefilter: 0.6 Hz is not below 0.5 Hz"),
     (lambda log: th.arx(log, 2, 2, ridge=-1.0), ValueError, "ridge"),

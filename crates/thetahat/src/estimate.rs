@@ -43,6 +43,7 @@ mod experiment_data;
 mod impulse_response;
 mod initial;
 mod instrumental;
+mod minimax;
 pub(crate) mod nonlinear_arx;
 mod offset;
 mod outcome;
@@ -85,6 +86,7 @@ pub use exact::LikelihoodOutcome;
 pub(crate) use experiment_data::ExperimentData;
 pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};
 pub use initial::Initial;
+pub use minimax::ProgramsOutcome;
 pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, LinearProblem, OutputOffset, Task, pays};
@@ -345,6 +347,9 @@ pub(crate) fn estimate_of_channels(
         Method::InstrumentalVariables => instrumental::instrumental_variables(record, orders, initial),
         Method::RefinedInstrumentalVariables => {
             instrumental::refined_instrumental_variables(record, orders, initial)
+        }
+        Method::Constrained(demands) if !orders.is_linear() => {
+            minimax::minimax(record, orders, initial, demands, monitor)
         }
         Method::Constrained(demands) => {
             let (initial, presample) = arx::resolved(initial)?;

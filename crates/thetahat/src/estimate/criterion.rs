@@ -8,6 +8,7 @@ use std::str::FromStr;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DVector;
+use thetahat_numerics::optimize::Search;
 use thetahat_numerics::regression::{
     Lagged, Presample, Unsolved,
     convex::{Failure, Fitting, Solved, peak},
@@ -16,6 +17,7 @@ use thetahat_numerics::regression::{
 
 use super::arx::{linear, out_of_range, rows, signals, taps, unsolved, with_past};
 use super::enough;
+use super::minimax::ProgramsOutcome;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -68,7 +70,8 @@ pub struct GainBound {
     pub high: f64,
 }
 
-/// What a fit of a model that is linear in its parameters makes small, and what it has to respect.
+/// What a fit of a model that is linear in its parameters makes small, and what it has to respect. For models with C, D
+/// or F there is the norm inf alone: max |e| is then made small by a sequence of linear programs.
 ///
 /// With e(t) = y(t) - phi(t)'theta over N samples, theta-hat minimises
 ///
@@ -87,7 +90,7 @@ pub struct GainBound {
 /// not depend on the units of the channels, and k = 1 weighs as one more sample for each parameter, in which its
 /// regressor stands alone at its RMS and y is 0. k has to be compared with N.
 ///
-/// All these are convex: there is one smallest value, and it is found. Norm 1 does not follow single wild samples
+/// For linear models all these are convex: there is one smallest value, and it is found. Norm 1 does not follow single wild samples
 /// (Bloomfield and Steiger, Least Absolute Deviations, 1983); norm inf, and the set of all theta with |e(t)| <= E, suit
 /// errors of known bound, such as those of a coarse converter (Milanese and Belforte, IEEE Transactions on Automatic
 /// Control 27 (1982), who also bound the set by a box).
@@ -112,6 +115,8 @@ pub struct ConvexFit {
     pub dc_gain: Vec<GainBound>,
     /// E, the largest |e(t)| that is allowed, in units of y.
     pub noise_bound: Option<f64>,
+    /// How to search where the model has C, D or F.
+    pub search: Search,
 }
 
 /// What came of a [`ConvexFit`].
@@ -133,6 +138,9 @@ pub struct ConvexOutcome {
     pub box_: Option<Vec<[f64; 2]>>,
     /// Steps of the interior point method; 0 where least squares alone respects all demands.
     pub iterations: u32,
+    /// The sequence of linear programs; none where one program is enough.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<ProgramsOutcome>,
 }
 
 /// A fit under a [`ConvexFit`].
@@ -397,7 +405,7 @@ pub(crate) fn constrained(
 
 impl ConvexFit {
     /// An outcome in which nothing is active.
-    fn outcome(&self, objective: f64) -> ConvexOutcome {
+    pub(super) fn outcome(&self, objective: f64) -> ConvexOutcome {
         ConvexOutcome {
             norm: self.norm,
             objective,
@@ -406,6 +414,7 @@ impl ConvexFit {
             noise_bound: self.noise_bound,
             box_: None,
             iterations: 0,
+            search: None,
         }
     }
 }

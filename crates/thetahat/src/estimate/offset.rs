@@ -235,7 +235,9 @@ impl<D: ExperimentData> Task<'_, D> {
     /// The method with the time that is left since then.
     fn method_within(&self, started: Instant) -> Method {
         let mut method = self.method.clone();
-        if let Method::PredictionError(search) | Method::ExactLikelihood(search) = &mut method
+        if let Method::PredictionError(search)
+        | Method::ExactLikelihood(search)
+        | Method::Constrained(ConvexFit { search, .. }) = &mut method
             && let Some(limit) = &mut search.time_limit
         {
             *limit = limit.saturating_sub(started.elapsed());

@@ -413,6 +413,11 @@ impl<'a> Predictor<'a> {
         }
     }
 
+    /// The weights of the initial-condition responses that were evaluated last, one segment after the other.
+    pub(super) fn free_weights(&self) -> Vec<f64> {
+        self.sections.iter().flat_map(|section| &section.trial).copied().collect()
+    }
+
     /// The steps to the best weights, at the current point: for each segment that for no change of the parameters, then what each of
     /// them takes from it.
     pub(super) fn free_steps(&self) -> Vec<f64> {

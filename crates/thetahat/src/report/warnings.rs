@@ -4,7 +4,7 @@ use thetahat_numerics::optimize::Stopped;
 
 use super::fitted_rows::is_exact;
 use super::schema::Report;
-use crate::estimate::{Procedure, SearchOutcome};
+use crate::estimate::{ConvexOutcome, Procedure, SearchOutcome};
 use crate::figures::{error, fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
@@ -68,6 +68,10 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
                 );
             }
         }
+        Procedure::Constrained(ConvexOutcome { search: Some(search), .. }) => {
+            let iterations = search.costs.len().saturating_sub(1);
+            warnings.extend(stopped_early(search.stopped, iterations, None));
+        }
         Procedure::Regularised(_) => warnings.extend(cut_off(model)),
         _ => {}
     }
@@ -116,24 +120,10 @@ fn cut_off(model: &PolynomialModel) -> impl Iterator<Item = String> {
 
 /// What is worth a warning of a search.
 fn search_warnings(search: &SearchOutcome) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let iterations = search.iterations;
-    match search.stopped {
-        Stopped::Converged => {}
-        Stopped::MaxIterations => warnings.push(format!(
-            "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
-             (`max-iterations`), or lower the orders"
-        )),
-        Stopped::TimeLimit => warnings.push(format!(
-            "no convergence: the time was used up after {iterations} iterations; allow more (`time-limit`)"
-        )),
-        Stopped::NoDescent if !search.stability_bound => warnings.push(format!(
-            "the search stopped after {iterations} iterations where no step lowers the cost (gradient {}): the cost is \
-             flat or rough there; lower the orders",
-            scientific(search.gradient_norm, 1)
-        )),
-        Stopped::NoDescent => {}
-    }
+    let (iterations, stopped) = (search.iterations, search.stopped);
+    let bounded = stopped == Stopped::NoDescent && search.stability_bound;
+    let early = (!bounded).then(|| stopped_early(stopped, iterations, Some(search.gradient_norm))).flatten();
+    let mut warnings: Vec<String> = early.into_iter().collect();
     if search.stability_bound {
         warnings.push(
             "the search ended at the stability boundary: C or F has a root on the unit circle; the data want an \
@@ -142,6 +132,25 @@ fn search_warnings(search: &SearchOutcome) -> Vec<String> {
         );
     }
     warnings
+}
+
+/// A warning of a search that ended elsewhere than at a minimum, after so many iterations and with this gradient, if there is one.
+fn stopped_early(stopped: Stopped, iterations: usize, gradient: Option<f64>) -> Option<String> {
+    match stopped {
+        Stopped::Converged => None,
+        Stopped::MaxIterations => Some(format!(
+            "no convergence in {iterations} iterations: the parameters are not those of least cost; allow more \
+             (`max-iterations`), or lower the orders"
+        )),
+        Stopped::TimeLimit => Some(format!(
+            "no convergence: the time was used up after {iterations} iterations; allow more (`time-limit`)"
+        )),
+        Stopped::NoDescent => Some(format!(
+            "the search stopped after {iterations} iterations where no step lowers the cost{}: the cost is flat or \
+             rough there; lower the orders",
+            gradient.map_or_else(String::new, |gradient| format!(" (gradient {})", scientific(gradient, 1)))
+        )),
+    }
 }
 
 /// A warning of a plant that seems to be unstable, where F, which must be stable, explains little.

@@ -31,7 +31,7 @@ mod program;
 use super::limit::Limit;
 use super::samples::{Samples, largest, smallest};
 use super::{Failure, Norm, Program, Row, Subspace};
-use crate::regression::{Lagged, Unsolved};
+use crate::regression::{Lagged, Unsolved, factor_rows};
 use program::Goal;
 
 /// A parameter whose spread is this fraction of what it was without limits is held by them.
@@ -54,6 +54,9 @@ const ALL: usize = 1000;
 const FREE: f64 = 2.0;
 /// If more than this part of them had a wrong sign, they are chosen again.
 const WRONG: f64 = 0.1;
+
+/// A step of this part of what is allowed goes as far as it may.
+const NEARLY: f64 = 1.0 - 1e-6;
 
 /// A regression under limits, ready to be solved in any norm.
 #[derive(Debug)]
@@ -112,8 +115,30 @@ impl<'a> Fitting<'a> {
     /// # Errors
     /// [`Unsolved`] names the parameters that all these leave open.
     pub fn new(lagged: &'a Lagged<'a>, limits: &'a [Limit], ridge: f64) -> Result<Self, Unsolved> {
-        let samples = Samples::new(lagged);
-        let mut factor = lagged.factor().map_err(|_| Unsolved::Range)?;
+        let factor = lagged.factor().map_err(|_| Unsolved::Range)?;
+        Self::of(Samples::of_lagged(lagged), factor, limits, ridge)
+    }
+
+    /// The same for a regression whose regressors are columns of the target's length.
+    ///
+    /// # Errors
+    /// As for [`Fitting::new`].
+    pub fn of_columns(
+        target: &'a [f64],
+        columns: &'a [Vec<f64>],
+        limits: &'a [Limit],
+    ) -> Result<Self, Unsolved> {
+        let entry = |row: usize, column: usize| columns.get(column).map_or(target[row], |column| column[row]);
+        let factor = factor_rows(0..target.len(), entry, columns.len() + 1).map_err(|_| Unsolved::Range)?;
+        Self::of(Samples::of_columns(target, columns), factor, limits, 0.0)
+    }
+
+    fn of(
+        samples: Samples<'a>,
+        mut factor: LeastSquares<f64, Dyn>,
+        limits: &'a [Limit],
+        ridge: f64,
+    ) -> Result<Self, Unsolved> {
         let regressors = factor.factor();
         let root = (samples.count() as f64).sqrt();
         let target = factor.rotated_output().norm().hypot(factor.residual_norm()) / root;
@@ -253,20 +278,52 @@ impl<'a> Fitting<'a> {
         let unit = root_mean_square(&residuals).max(rounding).max(least_unit);
         let unit = if unit > 0.0 { unit } else { 1.0 };
         let frame = Frame { base: central.parameters, unit, residuals };
-        let mut working = self.first(&frame, norm);
+        let working = self.first(&frame, norm);
         let radius = self.radius(&frame, &working, norm);
-        let mut iterations = central.iterations;
+        let solved = self.solved(&frame, working, norm, bound, radius)?;
+        Ok(Solved { iterations: central.iterations + solved.iterations, ..solved })
+    }
+
+    /// The parameters of the smallest norm, 1 or inf, under the limits and close to zero: |w| is at most `radius` in each
+    /// entry, in units of the RMS of y. A parameter moves the residuals by that RMS, in theirs, where its w is 1.
+    ///
+    /// # Errors
+    /// [`Failure::Unsolved`].
+    pub fn step(&self, norm: Norm, radius: f64) -> Result<Solved, Failure> {
+        let base = DVector::zeros(self.sizes.len());
+        let residuals = self.samples.residuals(&base);
+        let frame = Frame { base, unit: self.target(), residuals };
+        self.solved(&frame, self.first(&frame, norm), norm, None, Some(radius))
+    }
+
+    /// Whether a step goes as far as `radius` allows.
+    pub fn reaches(&self, step: &DVector<f64>, radius: f64) -> bool {
+        let way = &self.triangle * step / ((self.samples.count() as f64).sqrt() * self.target());
+        way.amax() > radius * NEARLY
+    }
+
+    /// The optimum of the program in w, to which samples are added until it holds all that it needs.
+    fn solved(
+        &self,
+        frame: &Frame,
+        mut working: Working,
+        norm: Norm,
+        bound: Option<f64>,
+        radius: Option<f64>,
+    ) -> Result<Solved, Failure> {
+        let unit = frame.unit;
+        let mut iterations = 0;
         for _ in 0..ROUNDS {
-            let program = self.program(&frame, &working, &Goal::Norm(norm), bound, radius);
+            let program = self.program(frame, &working, &Goal::Norm(norm), bound, radius);
             let optimum = program.solve()?;
             iterations += optimum.iterations;
-            let parameters = self.parameters(&frame, &optimum.x);
+            let parameters = self.parameters(frame, &optimum.x);
             let residuals = self.samples.residuals(&parameters);
             let level = match norm {
                 Norm::Infinity => Some(optimum.x[self.sizes.len()] * unit),
                 Norm::One | Norm::Two => bound,
             };
-            let mut grown = self.grow(&frame, &mut working, &parameters, &residuals, level);
+            let mut grown = self.grow(frame, &mut working, &parameters, &residuals, level);
             if norm == Norm::Infinity && !working.bounded && bound.is_some_and(|bound| level > Some(bound)) {
                 working.bounded = true;
                 grown = true;

@@ -13,13 +13,24 @@ const ROUNDING: f64 = 2.0 * f64::EPSILON;
 /// The samples of a regression that count, numbered from 0 over all segments.
 #[derive(Debug)]
 pub(super) struct Samples<'a> {
-    lagged: &'a Lagged<'a>,
-    /// The signal, lag and sign of each regressor.
-    columns: Vec<(usize, usize, f64)>,
-    segments: Vec<Segment>,
+    rows: Rows<'a>,
     /// The largest size of each regressor, and of the target after them.
     peaks: Vec<f64>,
     count: usize,
+}
+
+/// Where the numbers of a regression stand.
+#[derive(Debug)]
+enum Rows<'a> {
+    /// Regressors are past samples of signals.
+    Lagged {
+        lagged: &'a Lagged<'a>,
+        /// The signal, lag and sign of each regressor.
+        columns: Vec<(usize, usize, f64)>,
+        segments: Vec<Segment>,
+    },
+    /// Each regressor is a column of its own.
+    Columns { target: &'a [f64], columns: &'a [Vec<f64>] },
 }
 
 #[derive(Debug)]
@@ -33,26 +44,31 @@ struct Segment {
 }
 
 impl<'a> Samples<'a> {
-    pub(super) fn new(lagged: &'a Lagged<'a>) -> Self {
-        let mut samples =
-            Self { lagged, columns: lagged.columns().collect(), segments: vec![], peaks: vec![], count: 0 };
+    pub(super) fn of_lagged(lagged: &'a Lagged<'a>) -> Self {
+        let (mut segments, mut count) = (Vec::new(), 0);
         for segment in lagged.segments {
             let rows = lagged.counted(segment);
             if !rows.is_empty() {
-                samples.segments.push(Segment {
-                    number: samples.count,
-                    row: rows.start,
-                    start: segment.start,
-                });
-                samples.count += rows.len();
+                segments.push(Segment { number: count, row: rows.start, start: segment.start });
+                count += rows.len();
             }
         }
-        let peak = |column: &(usize, usize, f64)| {
+        Self::new(Rows::Lagged { lagged, columns: lagged.columns().collect(), segments }, count)
+    }
+
+    /// Columns of the target's length.
+    pub(super) fn of_columns(target: &'a [f64], columns: &'a [Vec<f64>]) -> Self {
+        Self::new(Rows::Columns { target, columns }, target.len())
+    }
+
+    fn new(rows: Rows<'a>, count: usize) -> Self {
+        let mut samples = Self { rows, peaks: Vec::new(), count };
+        let peak = |column| {
             let mut peak = 0.0_f64;
-            samples.each(*column, |_, value| peak = peak.max(value.abs()));
+            samples.each(column, |_, value| peak = peak.max(value.abs()));
             peak
         };
-        samples.peaks = samples.columns.iter().chain([&(0, 0, 1.0)]).map(peak).collect();
+        samples.peaks = (0..samples.regressors()).map(Some).chain([None]).map(peak).collect();
         samples
     }
 
@@ -61,46 +77,69 @@ impl<'a> Samples<'a> {
         self.count
     }
 
-    /// Calls `with` with each sample's number and its value in a column.
-    fn each(&self, (signal, lag, sign): (usize, usize, f64), mut with: impl FnMut(usize, f64)) {
-        let ends = self.segments.iter().skip(1).map(|next| next.number).chain([self.count]);
-        for (segment, end) in self.segments.iter().zip(ends) {
-            for number in segment.number..end {
-                let row = segment.row + number - segment.number;
-                with(number, sign * self.lagged.sample(signal, segment.start, row, lag));
+    fn regressors(&self) -> usize {
+        match &self.rows {
+            Rows::Lagged { columns, .. } => columns.len(),
+            Rows::Columns { columns, .. } => columns.len(),
+        }
+    }
+
+    /// Calls `with` with each sample's number and its value of a regressor, or of the target.
+    fn each(&self, column: Option<usize>, mut with: impl FnMut(usize, f64)) {
+        match &self.rows {
+            Rows::Lagged { lagged, columns, segments } => {
+                let (signal, lag, sign) = column.map_or((0, 0, 1.0), |column| columns[column]);
+                let ends = segments.iter().skip(1).map(|next| next.number).chain([self.count]);
+                for (segment, end) in segments.iter().zip(ends) {
+                    for number in segment.number..end {
+                        let row = segment.row + number - segment.number;
+                        with(number, sign * lagged.sample(signal, segment.start, row, lag));
+                    }
+                }
+            }
+            Rows::Columns { target, columns } => {
+                let values = column.map_or(*target, |column| &columns[column]);
+                values.iter().enumerate().for_each(|(number, value)| with(number, *value));
             }
         }
     }
 
     /// phi of a sample.
     pub(super) fn regressor(&self, number: usize) -> DVector<f64> {
-        let next = self.segments.partition_point(|segment| segment.number <= number);
-        let segment = &self.segments[next - 1];
-        let row = segment.row + number - segment.number;
-        let value = |&(signal, lag, sign): &(usize, usize, f64)| {
-            sign * self.lagged.sample(signal, segment.start, row, lag)
-        };
-        DVector::from_iterator(self.columns.len(), self.columns.iter().map(value))
+        match &self.rows {
+            Rows::Lagged { lagged, columns, segments } => {
+                let next = segments.partition_point(|segment| segment.number <= number);
+                let segment = &segments[next - 1];
+                let row = segment.row + number - segment.number;
+                let value = |&(signal, lag, sign): &(usize, usize, f64)| {
+                    sign * lagged.sample(signal, segment.start, row, lag)
+                };
+                DVector::from_iterator(columns.len(), columns.iter().map(value))
+            }
+            Rows::Columns { columns, .. } => {
+                DVector::from_iterator(columns.len(), columns.iter().map(|column| column[number]))
+            }
+        }
     }
 
     /// `y - Phi theta`. 2 N p flops.
     pub(super) fn residuals(&self, parameters: &DVector<f64>) -> Vec<f64> {
         let mut residuals = vec![0.0; self.count];
-        self.each((0, 0, 1.0), |number, value| residuals[number] = value);
-        for (&column, theta) in self.columns.iter().zip(parameters) {
-            self.each(column, |number, value| residuals[number] -= theta * value);
+        self.each(None, |number, value| residuals[number] = value);
+        for (column, theta) in parameters.iter().enumerate() {
+            self.each(Some(column), |number, value| residuals[number] -= theta * value);
         }
         residuals
     }
 
     /// The sum of phi over the samples that `of` has. 2 N p flops.
     pub(super) fn sum(&self, of: impl Fn(usize) -> bool) -> DVector<f64> {
-        let sum = |&column: &(usize, usize, f64)| {
+        let sum = |column| {
             let mut sum = 0.0;
-            self.each(column, |number, value| sum += if of(number) { value } else { 0.0 });
+            self.each(Some(column), |number, value| sum += if of(number) { value } else { 0.0 });
             sum
         };
-        DVector::from_iterator(self.columns.len(), self.columns.iter().map(sum))
+        DVector::from_iterator(self.regressors(), (0..self.regressors()).map(sum))
     }
 
     /// What rounding may add to a residual.

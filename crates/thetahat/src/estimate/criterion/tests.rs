@@ -506,6 +506,7 @@ fn units_of_the_channels_scale_the_fit() {
                 bounds: vec!["a1=-1.1..0".parse().unwrap()],
                 dc_gain: vec![gain(gain_unit)],
                 noise_bound: Some(2.5 * unit),
+                ..ConvexFit::default()
             };
             let expected = fit(&y, &u, &orders(2, 2), &of(1.0, 1.0)).unwrap();
             let (y, u) = (scaled(&y, y_unit), scaled(&u, u_unit));

@@ -41,6 +41,10 @@ pub(super) fn conditions(estimate: &Estimate) -> usize {
         Procedure::PredictionError(outcome) => outcome.initial_conditions,
         Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
         Procedure::ExactLikelihood(outcome) => outcome.search.initial_conditions,
+        Procedure::Robust(outcome) => outcome.search.initial_conditions,
+        Procedure::Constrained(outcome) => {
+            outcome.search.as_ref().map_or(0, |search| search.initial_conditions)
+        }
         _ => 0,
     }
 }

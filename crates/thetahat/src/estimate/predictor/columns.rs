@@ -16,6 +16,29 @@ impl Predictor<'_> {
     pub(in crate::estimate) fn columns(&self) -> Vec<Vec<Vec<f64>>> {
         self.sections.iter().map(|section| section.columns(&self.layouts[section.layout])).collect()
     }
+
+    /// The columns of psi with respect to the parameters, then to the weights of the initial-condition responses, one
+    /// segment after the other, over the samples that count, at the current point. Memory for N numbers for each.
+    pub(in crate::estimate) fn all_columns(&self) -> Vec<Vec<f64>> {
+        let parameters = self.orders().parameters();
+        let mut all = vec![vec![0.0; self.samples()]; parameters + self.initial_conditions()];
+        let (mut row, mut place) = (0, parameters);
+        for section in &self.sections {
+            let layout = &self.layouts[section.layout];
+            let places = (0..parameters).chain(place..place + layout.free);
+            let first = row;
+            for (place, column) in places.zip(section.raw_columns(layout)) {
+                row = first;
+                for run in &section.runs {
+                    let counted = run.start - layout.counted..run.end - layout.counted;
+                    all[place][row..row + run.len()].copy_from_slice(&column[counted]);
+                    row += run.len();
+                }
+            }
+            place += layout.free;
+        }
+        all
+    }
 }
 
 impl Section<'_> {

@@ -351,7 +351,19 @@ fn procedure(procedure: &Procedure) -> String {
                 stopped(&search.stopped)
             )
         }
-        Procedure::Constrained(outcome) => format!("convex optimization, norm {}", outcome.norm),
+        Procedure::Constrained(outcome) => {
+            let norm = outcome.norm;
+            outcome.search.as_ref().map_or_else(
+                || format!("convex optimization, norm {norm}"),
+                |search| {
+                    let iterations = search.costs.len().saturating_sub(1);
+                    format!(
+                        "linear programs, norm {norm}, iterations: {iterations}, {}",
+                        stopped(&search.stopped)
+                    )
+                },
+            )
+        }
         Procedure::Regularised(outcome) => format!(
             "regularised by the {} kernel of the largest likelihood, {} of its parameters free",
             outcome.kernel.name(),

@@ -410,7 +410,7 @@ fn every_refusal_says_what_to_do() {
         "fit log.csv --model oe --nb 2 --nf 2 --initial drop",
         "fit log.csv --model oe --nb 2 --nf 2 --tolerance 0",
         "fit log.csv --model oe --nb 2 --nf 2 --step 1",
-        "fit log.csv --model oe --nb 2 --nf 2 --norm infinity",
+        "fit log.csv --model oe --nb 2 --nf 2 --norm inf --ridge 2",
         "fit log.csv --model oe --nb 2 --nf 2 --method iv",
         "fit log.csv --model oe --nb 2 --nf 2 --estimate 1..5",
         "fit log.csv --na 2 --nb 2 --method sriv",

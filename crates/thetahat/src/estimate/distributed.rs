@@ -19,6 +19,7 @@ use std::ops::Range;
 
 use super::experiment_data::ExperimentData;
 use super::predictor::InitialCondition;
+use super::stretches::Packed;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -171,8 +172,8 @@ impl ExperimentData for Distributed<'_> {
         None
     }
 
-    fn thinned(&self) -> Option<Record<'_>> {
-        Some(self.thin.clone())
+    fn thinned(&self) -> Option<Packed> {
+        Some(Packed::of(&self.thin))
     }
 
     fn with_inputs<'e>(&'e self, signals: &'e [Vec<f64>]) -> Distributed<'e> {

@@ -7,7 +7,7 @@ use thetahat_numerics::optimize::Objective;
 use super::arx::signals;
 use super::polynomials::Unusable;
 use super::predictor::{InitialCondition, Predictor};
-use super::stretches::{energy, thinned};
+use super::stretches::{Packed, energy, thinned};
 use super::uncertainty::{Autoregression, autoregression, restricted};
 use crate::Error;
 use crate::data::Record;
@@ -28,7 +28,7 @@ pub(crate) trait ExperimentData {
     fn record(&self) -> Option<&Record<'_>>;
 
     /// Parts of them that are enough for starts, where they are many.
-    fn thinned(&self) -> Option<Record<'_>>;
+    fn thinned(&self) -> Option<Packed>;
 
     /// The same with further inputs after their own: constants, and what is known for every row at hand.
     fn with_inputs<'e>(&'e self, signals: &'e [Vec<f64>]) -> Self::Wider<'e>;
@@ -91,7 +91,7 @@ impl ExperimentData for Record<'_> {
         Some(self)
     }
 
-    fn thinned(&self) -> Option<Record<'_>> {
+    fn thinned(&self) -> Option<Packed> {
         thinned(self)
     }
 

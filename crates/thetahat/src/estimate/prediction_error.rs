@@ -22,6 +22,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation, polynomial::roots};
 use crate::respond::{NOTHING_LEFT, are_worth};
+pub(super) use ranking::TWIN;
 
 /// A search from the best start has ended after so many iterations, where there is nothing to be found elsewhere.
 const EASY_ITERATIONS: usize = 5;
@@ -144,6 +145,7 @@ impl Job<'_> {
     ) -> Result<TrackStart, Error> {
         if let Some(thin) = data.thinned() {
             // In the middle of a log nothing is at rest.
+            let thin = thin.record();
             let problem = Problem { record: &thin, orders, begin: InitialCondition::Unknown };
             let mut small = problem.predictor();
             let near = self.ranked(problem, &mut small).and_then(|mut beginning| {
@@ -176,7 +178,7 @@ impl Job<'_> {
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
     ///
     /// A search that is not soon at its end may be on the way to a minimum of its own: then starts from nested models are
-    /// compared with what it found, and always where these models are few.
+    /// compared with what it found, and always where these models are few and the record is not long.
     fn search_from(
         &self,
         data: &impl ExperimentData,
@@ -191,13 +193,14 @@ impl Job<'_> {
         };
         let easy = |found: &Found| {
             let soon = found.stopped == Stopped::Converged && found.costs.len() <= EASY_ITERATIONS + 1;
-            soon && !nested::are_few(orders)
+            soon && !data.record().is_some_and(|record| nested::are_few(record, orders))
         };
         if !beginning.compared && !found.as_ref().is_some_and(easy) && !self.deadline.is_over() {
             beginning.compared = true;
-            let lowest = found.as_ref().map_or(f64::INFINITY, Found::cost);
             let nested = match data.record() {
-                Some(record) => self.nested_below(Problem { record, orders, begin }, predictor, lowest)?,
+                Some(record) => {
+                    self.nested_below(Problem { record, orders, begin }, predictor, found.as_ref())?
+                }
                 None => None,
             };
             if let Some(start) = nested

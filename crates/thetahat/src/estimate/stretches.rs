@@ -11,10 +11,45 @@ pub(crate) const LONG: usize = 1 << 18;
 const STRETCHES: usize = 8;
 const STRETCH: usize = 1 << 12;
 
+/// Copies of the samples of some segments, one segment after the other: work on them does not grow with the record that
+/// they come from.
+#[derive(Debug, Clone)]
+pub(crate) struct Packed {
+    output: Vec<f64>,
+    inputs: Vec<Vec<f64>>,
+    segments: Vec<Range<usize>>,
+}
+
+impl Packed {
+    /// The samples of all segments of a record.
+    pub(super) fn of(record: &Record<'_>) -> Self {
+        let samples =
+            |signal: &[f64]| record.segments.iter().flat_map(|rows| &signal[rows.clone()]).copied().collect();
+        let mut end = 0;
+        let segments = record.segments.iter().map(|rows| {
+            end += rows.len();
+            end - rows.len()..end
+        });
+        let segments = segments.collect();
+        let inputs = record.inputs.iter().map(|input| samples(input)).collect();
+        Self { output: samples(record.output), inputs, segments }
+    }
+
+    /// These as a record of which nothing was measured before a segment.
+    pub(super) fn record(&self) -> Record<'_> {
+        Record {
+            output: &self.output,
+            inputs: self.inputs.iter().map(Vec::as_slice).collect(),
+            segments: self.segments.clone(),
+            past: vec![0; self.segments.len()],
+        }
+    }
+}
+
 /// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
-pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
+pub(super) fn thinned(record: &Record<'_>) -> Option<Packed> {
     let total: usize = record.segments.iter().map(Range::len).sum();
-    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH) }
+    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH).map(|record| Packed::of(&record)) }
 }
 
 /// The rows that starts see of many: such stretches, or of short segments every so many; none where these are all.
@@ -102,4 +137,26 @@ pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) ->
     }
     let past = vec![0; segments.len()];
     starts(&Record { output: &output, inputs: record.inputs.clone(), segments, past })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_segments_hold_the_samples_of_the_record() {
+        let output: Vec<f64> = (0..100).map(f64::from).collect();
+        let input: Vec<f64> = output.iter().map(|y| -y).collect();
+        let segments = vec![10..30, 40..41, 60..100];
+        let record = Record { output: &output, inputs: vec![&input], past: vec![3, 0, 0], segments };
+        let packed = Packed::of(&record);
+        let packed = packed.record();
+        assert_eq!(packed.segments, [0..20, 20..21, 21..61]);
+        assert_eq!(packed.past, [0; 3]);
+        for (own, from) in packed.segments.iter().zip(&record.segments) {
+            assert_eq!(packed.output[own.clone()], output[from.clone()]);
+            assert_eq!(packed.inputs[0][own.clone()], input[from.clone()]);
+        }
+        assert_eq!(packed.output.len(), 61);
+    }
 }

@@ -8,16 +8,18 @@ use std::ops::Range;
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Complex, ComplexField, DMatrix, DVector};
 use thetahat_numerics::optimize::{
-    Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search,
+    Algorithm, Deadline, Found, Monitor, Objective, Search, best_free, best_linear, search,
 };
+use thetahat_numerics::regression::Folding;
 
 use super::super::arx::{arx, rows};
 use super::super::border::Border;
 use super::super::instrumental::instrumental_variables;
 use super::super::outcome::{StartOutcome, search_outcome};
 use super::super::polynomials::Unusable;
-use super::super::prediction_error::{flat, prediction_error, root_of};
+use super::super::prediction_error::{TWIN, flat, prediction_error, root_of};
 use super::super::predictor::{InitialCondition, Predictor};
+use super::super::reflection;
 use super::super::stretches::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
@@ -44,6 +46,9 @@ struct Shared<'r> {
     matrix: Vec<f64>,
     right: Vec<f64>,
     border: Border,
+    /// Memory for the triangle of psi of theta, and of psi S.
+    triangle: Vec<f64>,
+    folding: Folding,
 }
 
 impl<'r> Shared<'r> {
@@ -63,6 +68,8 @@ impl<'r> Shared<'r> {
             own,
             matrix: vec![0.0; count * count],
             right: vec![0.0; count],
+            triangle: vec![0.0; size * (size + 1)],
+            folding: Folding::new(count + 1),
         }
     }
 
@@ -132,6 +139,49 @@ impl Objective for Shared<'_> {
         &self.right
     }
 
+    /// That of psi S, from that of psi.
+    fn triangle(&mut self, into: &mut [f64]) -> bool {
+        let (count, size) = (self.right.len(), self.own.len());
+        if !self.predictor.triangle(&mut self.triangle) {
+            return false;
+        }
+        self.folding.clear();
+        for block in self.triangle.chunks(Folding::ROWS * (size + 1)) {
+            self.folding.fold(block.len() / (size + 1), |column, values| {
+                for (value, row) in values.iter_mut().zip(block.chunks_exact(size + 1)) {
+                    let own = row.iter().zip(&self.own).filter(|(_, own)| **own == column);
+                    *value = if column == count { row[size] } else { own.map(|(entry, _)| entry).sum() };
+                }
+            });
+        }
+        for (place, value) in into.iter_mut().enumerate() {
+            let (row, column) = (place / (count + 1), place % (count + 1));
+            *value = if row <= column { self.folding.entry(row, column) } else { 0.0 };
+        }
+        true
+    }
+
+    /// A by its reflection coefficients, B as it is.
+    fn coordinates(&mut self, parameters: &[f64], into: &mut [f64]) -> bool {
+        let na = self.orders.na;
+        into.copy_from_slice(parameters);
+        reflection::coordinates(&parameters[..na], &mut into[..na])
+    }
+
+    fn is_curved(&self, place: usize) -> bool {
+        place < self.orders.na
+    }
+
+    fn parameters(&mut self, coordinates: &[f64], into: &mut [f64], mut slopes: Option<&mut [f64]>) {
+        let (na, size) = (self.orders.na, coordinates.len());
+        into.copy_from_slice(coordinates);
+        if let Some(slopes) = &mut slopes {
+            slopes.fill(0.0);
+            (na..size).for_each(|place| slopes[place * (size + 1)] = 1.0);
+        }
+        reflection::coefficients(&coordinates[..na], &mut into[..na], slopes.map(|slopes| (slopes, size)));
+    }
+
     fn is_outside(refusal: &Unusable) -> bool {
         *refusal == Unusable::Unstable
     }
@@ -157,7 +207,12 @@ pub(super) fn plant(
         let mut best: Option<Reached<'_>> = None;
         let mut outcomes = Vec::new();
         let mut winner = 0;
-        for (number, (name, start)) in starts.iter().enumerate() {
+        // Each is followed in the coordinates without a border too, unless another algorithm is asked for.
+        let turned = options.algorithm == Algorithm::LevenbergMarquardt;
+        let turned = [false, true].into_iter().take(1 + usize::from(turned));
+        let each =
+            starts.iter().flat_map(|(name, start)| turned.clone().map(move |turned| (*name, start, turned)));
+        for (number, (name, start, orthogonal)) in each.enumerate() {
             let mut shared = Shared::new(record, orders, plant, begin);
             if shared.samples() <= orders.parameters() + shared.initial_conditions() {
                 return Ok(None);
@@ -166,9 +221,10 @@ pub(super) fn plant(
             let mut start = start.clone();
             // Those of the constant are beside A in a start, and the output's here.
             let _ = best_linear(&mut shared, &mut start);
-            let found = search(&mut shared, &start, options, smallest, deadline, monitor)?.ok();
+            let options = Search { orthogonal, ..options.clone() };
+            let found = search(&mut shared, &start, &options, smallest, deadline, monitor)?.ok();
             outcomes.push(StartOutcome {
-                name: (*name).to_owned(),
+                name: format!("{name}{}", if orthogonal { TWIN } else { "" }),
                 cost: found.as_ref().map(|found| found.costs[0] / samples),
                 reached: found.as_ref().map(|found| found.cost() / samples),
             });
@@ -325,4 +381,55 @@ fn finish(
         parameters: found.parameters,
     };
     Ok((estimate, predictor.residuals()))
+}
+
+#[cfg(test)]
+mod tests {
+    use thetahat_numerics::noise::Noise;
+
+    use super::*;
+
+    #[test]
+    fn the_triangle_is_the_root_of_the_normal_equations_and_coordinates_lead_back() {
+        let mut noise = Noise(4);
+        let (u1, u2, y) = (noise.take(300), noise.take(300), noise.take(300));
+        let record = Record::new(&y, vec![&u1, &u2]).unwrap();
+        let orders = Orders::arx(3, &[2, 1], &[1, 1]).unwrap();
+        let plant = Orders::oe(&[2, 1], &[3, 3], &[1, 1]).unwrap();
+        let mut shared = Shared::new(&record, &orders, &plant, InitialCondition::Unknown);
+        let at = [-1.2, 0.6, -0.1, 1.0, 0.3, -0.5];
+        best_free(&mut shared, &at).unwrap();
+        shared.linearize().unwrap();
+        let count = at.len();
+        let mut triangle = vec![0.0; count * (count + 1)];
+        assert!(shared.triangle(&mut triangle));
+        let column =
+            |column: usize| triangle.iter().skip(column).step_by(count + 1).copied().collect::<Vec<f64>>();
+        let dot = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>();
+        for i in 0..count {
+            let size = shared.matrix()[i * (count + 1)];
+            for j in 0..count {
+                let other = shared.matrix()[j * (count + 1)];
+                let entry = shared.matrix()[i * count + j];
+                assert!((dot(column(i), column(j)) - entry).abs() < 1e-11 * (size * other).sqrt());
+            }
+            let right = shared.right()[i];
+            assert!((dot(column(i), column(count)) - right).abs() < 1e-9 * size.max(right.abs()));
+        }
+
+        let (mut coordinates, mut back) = ([0.0; 6], [0.0; 6]);
+        let mut slopes = vec![0.0; count * count];
+        assert!(shared.coordinates(&at, &mut coordinates));
+        shared.parameters(&coordinates, &mut back, Some(&mut slopes));
+        assert!(at.iter().zip(&back).all(|(at, back)| (at - back).abs() < 1e-12), "{back:?}");
+        for place in 0..count {
+            let (mut near, mut moved) = (coordinates, [0.0; 6]);
+            near[place] += 1e-6;
+            shared.parameters(&near, &mut moved, None);
+            for row in 0..count {
+                let slope = (moved[row] - back[row]) / 1e-6;
+                assert!((slope - slopes[row * count + place]).abs() < 1e-4, "{row} {place}");
+            }
+        }
+    }
 }

@@ -16,8 +16,8 @@ use crate::estimate::{
     experiment_data::PredictionErrors,
     polynomials::extended,
     predictor::InitialCondition,
-    start::Plants,
-    stretches::{filled, stretches},
+    start::{Plants, candidates},
+    stretches::{Packed, filled, stretches},
 };
 use crate::model::Orders;
 
@@ -27,7 +27,7 @@ const SAME_COST: f64 = 1e-6;
 const TOLERANCE: f64 = 1e-5;
 /// Models of a lattice at most.
 const MOST_MODELS: usize = 96;
-/// So few of them cost little.
+/// So few of them cost little, where the record is not long.
 const FEW_MODELS: usize = 9;
 /// Of a longer record the smaller models see segments.
 const LONG: usize = 1 << 12;
@@ -37,17 +37,17 @@ const SEGMENTS: usize = 4;
 type Levels = [usize; 5];
 
 impl Job<'_> {
-    /// The optima of the models with one coefficient fewer in A, every B, C, D or every F, as parameters of this model. None
-    /// without F, where the starts leave little to chance.
+    /// The optima of the models with one coefficient fewer in A, every B, C, D or every F, as parameters of this model.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
     pub(super) fn nested(&self, problem: Problem<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
         let Problem { record, orders, begin } = problem;
         if !orders.has_f() {
-            return Ok(Vec::new());
+            return self.predecessors(problem);
         }
         let thin = thinned(record);
+        let thin = thin.as_ref().map(Packed::record);
         // In the middle of a log nothing is at rest.
         let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, InitialCondition::Unknown));
         let top = levels(orders);
@@ -84,6 +84,27 @@ impl Job<'_> {
         Ok(last.collect())
     }
 
+    /// The optima of the models with one coefficient fewer in A, every B or C, each from its own recipes, as parameters of
+    /// this model.
+    fn predecessors(&self, problem: Problem<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
+        let Problem { record, orders, begin } = problem;
+        let thin = thinned(record);
+        let thin = thin.as_ref().map(Packed::record);
+        let (record, begin) = thin.as_ref().map_or((record, begin), |thin| (thin, InitialCondition::Unknown));
+        let top = levels(orders);
+        let mut padded = Vec::new();
+        for less in smaller(&top).filter(|less| !self.deadline.is_over() && less[2] > 0) {
+            let own = lowered(orders, &top, &less);
+            let mut predictor = Problem { record, orders: &own, begin }.predictor();
+            let recipes = filled(record, |record| candidates(record, &own, self.deadline));
+            let starts = recipes.unwrap_or_default().into_iter().map(|candidate| candidate.parameters);
+            if let Some(parameters) = self.optimum(&mut predictor, starts.collect())? {
+                padded.push(extended(&own, &parameters, orders));
+            }
+        }
+        Ok(padded)
+    }
+
     /// Where a search leads from the best of some starts: best after a few iterations of those that cost least.
     fn optimum(
         &self,
@@ -108,9 +129,13 @@ impl Job<'_> {
 }
 
 /// Segments of a longer record: enough to see where searches lead.
-pub(super) fn thinned<'a>(record: &Record<'a>) -> Option<Record<'a>> {
-    let samples: usize = record.segments.iter().map(Range::len).sum();
-    if samples > LONG { stretches(record, SEGMENTS, LONG / SEGMENTS) } else { None }
+pub(super) fn thinned(record: &Record<'_>) -> Option<Packed> {
+    let few = if is_long(record) { stretches(record, SEGMENTS, LONG / SEGMENTS) } else { None };
+    few.map(|record| Packed::of(&record))
+}
+
+pub(super) fn is_long(record: &Record<'_>) -> bool {
+    record.segments.iter().map(Range::len).sum::<usize>() > LONG
 }
 
 /// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for those
@@ -151,9 +176,9 @@ fn following(at: &Levels, bottom: &Levels, top: &Levels) -> Option<Levels> {
 }
 
 /// Whether the models below one are so few that a search of each costs little.
-pub(super) fn are_few(orders: &Orders) -> bool {
+pub(super) fn are_few(record: &Record<'_>, orders: &Orders) -> bool {
     let top = levels(orders);
-    count(&top, &bottom(&top)) <= FEW_MODELS
+    !is_long(record) && count(&top, &bottom(&top)) <= FEW_MODELS
 }
 
 /// The models of a lattice.

@@ -6,9 +6,11 @@
 //! Marquardt, the promising ones after some more.
 
 use rayon::prelude::*;
-use thetahat_numerics::optimize::{Algorithm, Found, Search, best_free, best_linear, predicted_decrease};
+use thetahat_numerics::optimize::{
+    Algorithm, Found, Search, Stopped, best_free, best_linear, predicted_decrease,
+};
 
-use super::nested::thinned;
+use super::nested::{is_long, thinned};
 use super::{Job, Problem, TrackStart, hopeless};
 use crate::Error;
 use crate::estimate::experiment_data::PredictionErrors;
@@ -17,6 +19,7 @@ use crate::estimate::predictor::InitialCondition;
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
 use crate::estimate::stretches::filled;
+use crate::model::Orders;
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.
 const DISAGREEMENT: f64 = 1e-3;
@@ -27,16 +30,19 @@ const SAME_COST: f64 = 1e-6;
 /// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
 /// with which a start goes on.
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
-/// The same where there is no F: iterations are cheap, and starts are few.
-const LONG_ROUND: [(usize, f64); 1] = [(100, 1.0)];
+/// The same where there is no F: iterations are cheap, and starts are few. Those that have come to the same place by then go on
+/// as one.
+const LONG_ROUNDS: [(usize, f64); 2] = [(8, 2.0), (100, 1.0)];
 
 /// What the name of a start ends with that is followed in the coordinates of the objective too.
-const TWIN: &str = "-orthogonal";
+pub(in crate::estimate) const TWIN: &str = "-orthogonal";
 
 /// The name of the start that was given.
 const GIVEN: &str = "initial-parameters";
 /// The name of those from smaller models.
 const NESTED: &str = "nested";
+/// The name of what a search has found, among other starts.
+const FOUND: &str = "found";
 
 /// A start and how far it was followed.
 #[derive(Debug, Clone)]
@@ -84,6 +90,26 @@ impl Job<'_> {
         let mut compared = !has_f || !default || several;
         let may_compare = (has_f || starts.len() > 1) && default && !known && !self.deadline.is_over();
         let doubtful = may_compare && is_doubtful(problem, &starts, predictor);
+        if doubtful
+            && !(has_f || several)
+            && is_long(record)
+            && let Ok(found) = self.search(predictor, &starts[0].parameters, false)?
+        {
+            let best = &mut starts[0];
+            (best.cost, best.parameters) = (found.cost(), found.parameters.clone());
+            best.outcome.reached = Some(best.cost / predictor.samples() as f64);
+            if leaves_white_errors(orders, &found, predictor) {
+                return Ok(TrackStart {
+                    parameters: found.parameters.clone(),
+                    orthogonal: false,
+                    starts: starts.into_iter().map(|start| start.outcome).collect(),
+                    unstable_pole,
+                    samples: None,
+                    compared: true,
+                    found: Some(found),
+                });
+            }
+        }
         if doubtful || may_compare && several {
             starts.extend(self.nested_starts(problem, predictor)?);
             if doubtful {
@@ -91,7 +117,7 @@ impl Job<'_> {
                 let twins: Vec<Start> =
                     starts.iter().filter(|start| has_f && start.cost.is_finite()).map(Start::twin).collect();
                 starts.extend(twins);
-                let rounds = if has_f { &ROUNDS[..] } else { &LONG_ROUND };
+                let rounds = if has_f { &ROUNDS } else { &LONG_ROUNDS };
                 self.compare(predictor, &mut starts, rounds)?;
             }
             sort(&mut starts);
@@ -141,15 +167,31 @@ impl Job<'_> {
         Ok(nested.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor)).collect())
     }
 
-    /// The best start from nested models after some iterations, if they lead below a cost.
+    /// The best start from nested models after some iterations, if they lead below what was found. On a longer record only those
+    /// do that lead below on segments of it.
     pub(super) fn nested_below(
         &self,
         problem: Problem<'_, '_>,
         predictor: &mut impl PredictionErrors,
-        lowest: f64,
+        found: Option<&Found>,
     ) -> Result<Option<Start>, Error> {
-        let mut starts = self.nested_starts(problem, predictor)?;
+        let mut starts = self.nested(problem)?;
+        if let (Some(thin), Some(found)) = (thinned(problem.record), found) {
+            let thin = thin.record();
+            let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };
+            let mut small = problem.predictor();
+            let mut own = [Start::new(FOUND, found.parameters.clone(), &mut small)];
+            self.compare(&mut small, &mut own, &ROUNDS)?;
+            let mut others: Vec<Start> =
+                starts.into_iter().map(|parameters| Start::new(NESTED, parameters, &mut small)).collect();
+            self.compare(&mut small, &mut others, &ROUNDS)?;
+            others.retain(|other| other.cost < (1.0 - SAME_COST) * own[0].cost);
+            starts = others.into_iter().map(|start| start.parameters).collect();
+        }
+        let starts = starts.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor));
+        let mut starts: Vec<Start> = starts.collect();
         self.compare(predictor, &mut starts, &ROUNDS)?;
+        let lowest = found.map_or(f64::INFINITY, Found::cost);
         Ok(starts.into_iter().next().filter(|start| start.cost < lowest))
     }
 
@@ -263,11 +305,20 @@ fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut impl 
     }
     match thinned(problem.record) {
         Some(thin) => {
+            let thin = thin.record();
             let problem = Problem { record: &thin, begin: InitialCondition::Unknown, ..problem };
             lead_apart(&recipes, &mut problem.predictor())
         }
         None => lead_apart(&recipes, predictor),
     }
+}
+
+/// Whether a search has converged and its errors are white. Of a long record these say that no other minimum is lower: there is
+/// nothing left to explain but what a few parameters take of the noise.
+fn leaves_white_errors(orders: &Orders, found: &Found, predictor: &impl PredictionErrors) -> bool {
+    let taken = orders.parameters() + predictor.initial_conditions();
+    let is_white = || predictor.autoregression(taken).is_some_and(|colour| colour.order() == 0);
+    found.stopped == Stopped::Converged && is_white()
 }
 
 fn lead_apart(recipes: &[&Start], predictor: &mut impl PredictionErrors) -> bool {

@@ -326,6 +326,45 @@ fn a_larger_model_does_not_fit_a_log_worse_than_a_nested_one() {
     }
 }
 
+#[test]
+fn a_larger_armax_model_does_not_fit_a_log_worse_than_a_nested_one() {
+    for (file, nk, smaller, larger) in
+        [("robot_arm.csv", 1, (3, 2, 3), (3, 3, 3)), ("gas_furnace.csv", 3, (2, 3, 4), (3, 3, 4))]
+    {
+        let (u, y) = public(file);
+        let record = Record::new(&y, vec![&u]).unwrap();
+        let [small, large] = [smaller, larger].map(|(na, nb, nc)| {
+            let orders = Orders::armax(na, &[nb], nc, &[nk]).unwrap();
+            found(&record, &orders, Initial::Zero, &Search::default()).unwrap()
+        });
+        assert!(large.mse() <= 1.001 * small.mse(), "{file}: {} {}", large.mse(), small.mse());
+    }
+}
+
+/// Of a long record one start is enough where it leaves white errors; where it does not, all are compared.
+#[test]
+fn white_errors_of_a_long_record_end_the_comparison_of_starts() {
+    let mut noise = Noise(4);
+    let (u, e) = (noise.take(6000), noise.take(6000));
+    let a = [1.0, -1.5, 0.7];
+    let x = filtered(&[0.0, 1.0, 0.5], &a, &u);
+    let v = filtered(&[1.0, -1.0, 0.2], &a, &e);
+    let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + v).collect();
+    let record = Record::new(&y, vec![&u]).unwrap();
+    let follow = |orders: Orders| {
+        let estimate = found(&record, &orders, Initial::Zero, &Search::default()).unwrap();
+        let starts = &outcome(&estimate).starts;
+        (starts.iter().filter(|start| start.reached.is_some()).count(), estimate.mse())
+    };
+    let (one, mse) = follow(Orders::armax(2, &[2], 2, &[1]).unwrap());
+    assert_eq!(one, 1);
+    let several = Search { starts: 8, ..Search::default() };
+    let orders = Orders::armax(2, &[2], 2, &[1]).unwrap();
+    let least = found(&record, &orders, Initial::Zero, &several).unwrap().mse();
+    assert!((mse / least - 1.0).abs() < 1e-6, "{mse} {least}");
+    assert!(follow(Orders::armax(1, &[2], 2, &[1]).unwrap()).0 > 1);
+}
+
 /// The plant's pole is on the unit circle: a search comes to the boundary, and goes on along it.
 #[test]
 fn a_search_goes_on_along_the_border_of_stability() {

@@ -17,7 +17,7 @@ use thetahat_numerics::regression::{
 
 use super::arx::{linear, out_of_range, rows, signals, taps, unsolved, with_past};
 use super::enough;
-use super::minimax::ProgramsOutcome;
+use super::outcome::ProgramsOutcome;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;

@@ -27,18 +27,17 @@
 //! It starts from the least squares estimate. Memory: psi, N numbers for each unknown. Cost of an iteration: O(N p^2), and
 //! programs of some 10 p rows, or of some (N p)^(2/3) for the sum.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DVector;
 use thetahat_numerics::optimize::{Deadline, Monitor, Objective, Progress, Search, Stopped, best_free};
 use thetahat_numerics::regression::Unsolved;
 use thetahat_numerics::regression::convex::{Fitting, Limit, peak};
 
 use super::criterion::{ConvexFit, ConvexOutcome, Norm};
+use super::outcome::ProgramsOutcome;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::predictor::Predictor;
 use super::stretches::energy;
-use super::{Estimate, Initial, Procedure, SearchOutcome};
+use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -62,22 +61,6 @@ const LONGEST: f64 = 2.0;
 const FARTHEST: f64 = 12.0;
 /// A promise below this part of V is rounding.
 const ROUNDING: f64 = 1e-12;
-
-/// How the sequence of linear programs went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ProgramsOutcome {
-    /// The largest |e| at the start, that of least squares, and after each iteration.
-    pub costs: Vec<f64>,
-    /// By which part of itself a step lowers the largest |e| at most, to first order, if it moves the errors by up to
-    /// their RMS: 0 at a minimum.
-    pub promise: f64,
-    /// Why it stopped.
-    pub stopped: Stopped,
-    /// The initial conditions that were estimated.
-    pub initial_conditions: usize,
-    /// The search for least squares, from whose end this one starts.
-    pub least_squares: SearchOutcome,
-}
 
 /// Where a sequence of linear programs ended.
 pub(super) struct Least {

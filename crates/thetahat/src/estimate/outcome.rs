@@ -61,6 +61,22 @@ pub struct SearchOutcome {
     pub plant_first: bool,
 }
 
+/// How the sequence of linear programs went.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProgramsOutcome {
+    /// The largest |e| at the start, that of least squares, and after each iteration.
+    pub costs: Vec<f64>,
+    /// By which part of itself a step lowers the largest |e| at most, to first order, if it moves the errors by up to
+    /// their RMS: 0 at a minimum.
+    pub promise: f64,
+    /// Why it stopped.
+    pub stopped: Stopped,
+    /// The initial conditions that were estimated.
+    pub initial_conditions: usize,
+    /// The search for least squares, from whose end this one starts.
+    pub least_squares: SearchOutcome,
+}
+
 /// How a search on the whole record went.
 pub(super) fn search_outcome(
     options: &Search,

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
-use crate::fit_reference::folder_with_any;
+use crate::fit_reference::{folder_with, folder_with_any};
 use crate::harness::{Folder, number};
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
@@ -376,6 +376,22 @@ fn refined_models_have_standard_errors_everywhere() {
     ] {
         let refusal = folder.run(&format!("fit {MOTOR} {options}"));
         assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
+    }
+}
+
+/// Subspace methods start far from the least errors of a free run, or are unstable there.
+#[test]
+fn a_model_of_one_output_is_refined_from_polynomials_too() {
+    for (file, order, largest) in [("hair_dryer.csv", 6, 0.00490), ("robot_arm.csv", 6, 6.0e-5)] {
+        let folder = folder_with(file);
+        let options = format!("log.csv --sample-time 1 -u u -y y --model ss --order {order}");
+        let report = folder.fit(&format!("{options} --refine simulation"));
+        let start = &report["estimation"]["refinement"]["search"]["start"];
+        assert_eq!(start, "output-error", "{file}");
+        let fits = report["fit"].as_array().expect("a list");
+        let run = fits.iter().find(|fit| fit["horizon"] == free_run()).expect("a free run");
+        let rmse = run["rmse"].as_f64().expect("a number");
+        assert!(rmse * rmse <= largest, "{file}: {}", rmse * rmse);
     }
 }
 

@@ -11,9 +11,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::{DMatrix, DVector};
-use thetahat_numerics::optimize::{
-    Deadline, Found, Monitor, Objective, Progress, Search, Stopped, lowest, search,
-};
+use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Progress, Search, Stopped, search};
 
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use crate::Error;
@@ -158,8 +156,10 @@ pub(crate) fn refined(
     monitor: Monitor<'_>,
 ) -> Result<Refined, Error> {
     options.check_numbers()?;
-    let first = starts.first().ok_or_else(no_errors)?;
-    let units = Units::of(record, first, what)?;
+    // Those of the first that has errors: a subspace method may find an unstable model.
+    let units =
+        |start| Units::of(record, start, what).transpose().map(|units| units.map(|units| (start, units)));
+    let (first, units) = starts.iter().find_map(units).ok_or_else(no_errors)??;
     let scaled = units.record(record, &first.levels);
     let record = JointRecord {
         inputs: scaled.inputs.iter().map(Vec::as_slice).collect(),
@@ -175,32 +175,55 @@ pub(crate) fn refined(
         searched(&record, (form, model.k), what, &units.floor, options, (deadline, monitor))
     };
     let searched = starts.par_iter().map(search_from).collect::<Result<Vec<_>, Error>>()?;
-    let best = lowest(searched.iter().map(|searched| searched.as_ref().map(|searched| &searched.found)));
-    let best = best.ok_or_else(no_errors)?;
     let mean = |cost: f64| cost / samples(&record);
     let outcome = |(start, searched): (&RefinementStart, &Option<Searched>)| StartOutcome {
         name: start.name.clone(),
         cost: searched.as_ref().and_then(|searched| searched.found.costs.first()).map(|cost| mean(*cost)),
         reached: searched.as_ref().map(|searched| mean(searched.found.cost())),
     };
-    let mut outcomes: Vec<StartOutcome> = starts.iter().zip(&searched).map(outcome).collect();
-    outcomes.swap(0, best);
-    let Some(Searched { mut form, mut k, found }) = searched.into_iter().nth(best).flatten() else {
-        return Err(no_errors());
-    };
+    let outcomes: Vec<StartOutcome> = starts.iter().zip(&searched).map(outcome).collect();
+    let number = |(number, searched): (usize, Option<Searched>)| Some((number, searched?));
+    let mut searched: Vec<(usize, Searched)> = searched.into_iter().enumerate().filter_map(number).collect();
+    searched.sort_by(|(_, one), (_, other)| one.found.cost().total_cmp(&other.found.cost()));
+    // At the border of stability the least errors may have no model: then the next.
+    let mut refusal = None;
+    for (best, searched) in searched {
+        let mut outcomes = outcomes.clone();
+        outcomes.swap(0, best);
+        let scale = (&units, first, what);
+        match finished(&record, searched, outcomes, scale, options, (deadline, monitor)) {
+            Err(Error::Interrupted) => return Err(Error::Interrupted),
+            Err(error) => refusal = refusal.or(Some(error)),
+            found => return found,
+        }
+    }
+    Err(refusal.unwrap_or_else(no_errors))
+}
 
+/// The model of what a search led to, in the units of the signals. `first` is the start that these units are of.
+///
+/// # Errors
+/// [`Error::Interrupted`]; [`Error::Undetermined`] where its states, its directions or its errors are not finite.
+fn finished(
+    record: &JointRecord<'_>,
+    Searched { mut form, mut k, found }: Searched,
+    outcomes: Vec<StartOutcome>,
+    (units, first, what): (&Units, &RefinementStart, Refinement),
+    options: &Search,
+    (deadline, monitor): (Deadline, Monitor<'_>),
+) -> Result<Refined, Error> {
     // The covariance in coordinates and directions of what was found.
-    let sizes = form.state_sizes(&record, what.refine).ok_or_else(no_errors)?;
+    let sizes = form.state_sizes(record, what.refine).ok_or_else(no_errors)?;
     form.divide_states(&sizes);
     k.row_iter_mut().zip(&sizes).for_each(|(mut row, size)| row /= *size);
     let basis = directions(&form, what).ok_or_else(no_errors)?;
-    let own = Linearized::at(&record, what.refine, form.clone(), basis, &units.floor)?;
+    let own = Linearized::at(record, what.refine, form.clone(), basis, &units.floor)?;
     let search = search_outcome(options, &found, &own.errors, outcomes);
-    let widened = samples(&record) / what.degrees_of_freedom as f64;
+    let widened = samples(record) / what.degrees_of_freedom as f64;
     let (mut model, factors) = match what.refine {
         Refine::Prediction => (own.model(), vec![own.variations(None)]),
         Refine::Simulation => {
-            let predictor = best_predictor(&record, &form, k, &units.floor, options, (deadline, monitor))?;
+            let predictor = best_predictor(record, &form, k, &units.floor, options, (deadline, monitor))?;
             let model = predictor.model();
             let scores = own.errors.covariance_of_right(&model);
             let plant = scores.and_then(|scores| own.variations(Some(&scores)));
@@ -411,9 +434,15 @@ struct Scaled {
 }
 
 impl Units {
+    /// None where the start is unstable.
+    ///
     /// # Errors
-    /// [`Error::Undetermined`] if the start has no errors.
-    fn of(record: &JointRecord<'_>, start: &RefinementStart, what: Refinement) -> Result<Self, Error> {
+    /// [`Error::Undetermined`] if nothing is left of an output.
+    fn of(
+        record: &JointRecord<'_>,
+        start: &RefinementStart,
+        what: Refinement,
+    ) -> Result<Option<Self>, Error> {
         let rows = || record.segments.iter().cloned().flatten();
         let size = |signal: &[f64], level: f64| {
             let mean = rows().map(|row| (signal[row] - level).powi(2)).sum::<f64>() / samples(record);
@@ -428,7 +457,9 @@ impl Units {
             Form { levels: DVector::from_column_slice(&start.levels), ..Form::of(&start.model, what.refine) };
         let none = DMatrix::zeros(form.flat().len(), 0);
         let mut errors = Errors::new(record, what.refine, form, none, floor.clone());
-        errors.evaluate(&[]).map_err(|Unstable| no_errors())?;
+        if errors.evaluate(&[]).is_err() {
+            return Ok(None);
+        }
         let exact = |place: &usize| errors.covariance[(*place, *place)] <= EXACT * outputs[*place].powi(2);
         if let Some(place) = (0..outputs.len()).find(exact) {
             return Err(Error::undetermined(
@@ -443,7 +474,7 @@ impl Units {
         let l = outputs.len();
         let back = factor.l();
         let root = back.solve_lower_triangular(&DMatrix::identity(l, l)).ok_or_else(no_errors)?;
-        Ok(Self { inputs, outputs, floor: &root * floor * root.transpose(), root, back })
+        Ok(Some(Self { inputs, outputs, floor: &root * floor * root.transpose(), root, back }))
     }
 
     fn record(&self, record: &JointRecord<'_>, levels: &[f64]) -> Scaled {

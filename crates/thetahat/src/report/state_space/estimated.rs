@@ -3,17 +3,18 @@
 use std::ops::RangeInclusive;
 
 use thetahat_core::nalgebra::DMatrix;
-use thetahat_numerics::optimize::Monitor;
+use thetahat_numerics::optimize::{Monitor, Search};
 
 use super::StateSpacePlan;
 use crate::Error;
-use crate::data::{JointRecord, Log};
+use crate::data::{JointRecord, Log, Record};
 use crate::estimate::{
-    Constant, Ordered, Procedure, Refinement, RefinementOutcome, RefinementStart, Subspace, SubspaceErrors,
-    SubspaceOptions, SubspaceOutcome, SubspaceSums, VectorArxEstimate, VectorArxOptions, Weighting,
-    products_of_innovations, refined, subspace, vector_arx, with_levels,
+    Constant, Initial, Method, Ordered, Procedure, Refine, Refinement, RefinementOutcome, RefinementStart,
+    Subspace, SubspaceErrors, SubspaceOptions, SubspaceOutcome, SubspaceSums, VectorArxEstimate,
+    VectorArxOptions, Weighting, estimate_monitored, products_of_innovations, refined, subspace, vector_arx,
+    with_levels,
 };
-use crate::model::{EntryCovariance, StateSpace};
+use crate::model::{EntryCovariance, Orders, PolynomialModel, Signal, StateSpace};
 
 /// Singular values that a report keeps.
 const MOST_VALUES: usize = 40;
@@ -140,8 +141,9 @@ pub(super) fn by_subspace(
     let (mut covariance, mut refinement) = (None, None);
     if let Some(refine) = plan.refine {
         let start = RefinementStart { name: subspace.weighting().to_string(), model: matrices, levels };
-        let starts: Vec<RefinementStart> =
+        let mut starts: Vec<RefinementStart> =
             std::iter::once(start).chain(other_start(record, subspace, order, log)).collect();
+        starts.extend(polynomial_start(record, plan, (order, &starts[0]), log, monitor)?);
         let what = Refinement {
             refine,
             feedthrough: subspace.feedthrough(),
@@ -240,4 +242,51 @@ fn other_start(
     let other = subspace(record, &options).ok()?;
     let (model, levels) = (other.state_space(order, log.sample_time()).ok()?, other.levels(order)?);
     Some(RefinementStart { name: weighting.to_string(), model, levels })
+}
+
+/// The model of one output in polynomials whose errors are least, of the free run or one step ahead: what a subspace method finds may
+/// be far from it. None of several outputs, of no input, or where the search fails. Its level is that of another start.
+///
+/// # Errors
+/// [`Error::Interrupted`].
+fn polynomial_start(
+    record: &JointRecord<'_>,
+    plan: &StateSpacePlan,
+    (order, other): (usize, &RefinementStart),
+    log: &Log,
+    monitor: Monitor<'_>,
+) -> Result<Option<RefinementStart>, Error> {
+    let ([output], Some(refine), false) = (&record.outputs[..], plan.refine, record.inputs.is_empty()) else {
+        return Ok(None);
+    };
+    let inputs = record.inputs.len();
+    // A feedthrough is a coefficient of B without a delay.
+    let first = usize::from(other.model.d.iter().all(|entry| *entry == 0.0));
+    let (nb, nk) = (vec![order + 1 - first; inputs], vec![first; inputs]);
+    let plant_first = refine == Refine::Simulation;
+    let orders =
+        if plant_first { Orders::arx(order, &nb, &nk) } else { Orders::armax(order, &nb, order, &nk) };
+    let Ok(orders) = orders else { return Ok(None) };
+    let above: Vec<f64> = output.iter().map(|y| y - other.levels[0]).collect();
+    let own = Record {
+        output: &above,
+        inputs: record.inputs.clone(),
+        segments: record.segments.clone(),
+        past: vec![0; record.segments.len()],
+    };
+    let method = Method::PredictionError(Search { plant_first, ..plan.search.clone() });
+    let found = match estimate_monitored(&own, &orders, &method, Initial::Auto, monitor) {
+        Err(Error::Interrupted) => return Err(Error::Interrupted),
+        other => other,
+    };
+    let model = found.and_then(|found| {
+        let signals = vec![Signal::default(); inputs];
+        found.to_model(&orders, log.sample_time(), signals, Signal::default())
+    });
+    let start = |model: PolynomialModel| RefinementStart {
+        name: if plant_first { "output-error" } else { "armax" }.to_owned(),
+        model: model.state_space(),
+        levels: other.levels.clone(),
+    };
+    Ok(model.ok().map(start).filter(|start| start.model.f.nrows() == order))
 }

@@ -25,7 +25,7 @@ fn the_normal_equations_have_the_gradient_of_the_cost() -> Result<(), Error> {
     let start = start(&record, Weighting::Ssarx)?;
     for refine in Refine::ALL {
         let what = what(refine);
-        let units = Units::of(&record, &start, what)?;
+        let units = Units::of(&record, &start, what)?.expect("a stable start");
         let scaled = units.record(&record, &start.levels);
         let scaled = JointRecord {
             inputs: scaled.inputs.iter().map(Vec::as_slice).collect(),

@@ -73,6 +73,14 @@ pub(super) struct Least {
     steps: u32,
 }
 
+/// The error of parameters whose errors overflow.
+pub(super) fn unusable(orders: &Orders) -> Error {
+    Error::undetermined(
+        orders.names(),
+        "the errors overflow; scale the channels towards one, or lower the orders",
+    )
+}
+
 /// Fits a model that is not linear in its parameters with the least largest error.
 pub(super) fn minimax(
     record: &Record<'_>,
@@ -95,13 +103,7 @@ pub(super) fn minimax(
     let deadline = Deadline::after(options.time_limit);
     let squares = prediction_error(record, orders, initial, options, monitor)?;
     let mut predictor = predictor_of(record, orders, &squares);
-    let unusable = || {
-        Error::undetermined(
-            orders.names(),
-            "the errors overflow; scale the channels towards one, or lower the orders",
-        )
-    };
-    best_free(&mut predictor, squares.parameters()).map_err(|_| unusable())?;
+    best_free(&mut predictor, squares.parameters()).map_err(|_| unusable(orders))?;
     let nothing = (NOTHING_LEFT * energy(record)).sqrt();
     let at = squares.parameters();
     let least = least(&mut predictor, at, Norm::Infinity, nothing, options, deadline, monitor)?;

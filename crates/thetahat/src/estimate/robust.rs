@@ -137,12 +137,7 @@ pub(super) fn robust(
     options.check_numbers()?;
     let squares = prediction_error(record, orders, initial, options, monitor)?;
     let mut predictor = predictor_of(record, orders, &squares);
-    let unusable = || {
-        Error::undetermined(
-            orders.names(),
-            "the errors overflow; scale the channels towards one, or lower the orders",
-        )
-    };
+    let unusable = || minimax::unusable(orders);
     best_free(&mut predictor, squares.parameters()).map_err(|_| unusable())?;
     predictor.linearize();
     let mut scale = scale(&predictor.residuals().0);

@@ -30,9 +30,8 @@ const SAME_COST: f64 = 1e-6;
 /// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
 /// with which a start goes on.
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
-/// The same where there is no F: iterations are cheap, and starts are few. Those that have come to the same place by then go on
-/// as one.
-const LONG_ROUNDS: [(usize, f64); 2] = [(8, 2.0), (100, 1.0)];
+/// The same where there is no F: iterations are cheap, and starts are few.
+const LONG_ROUND: [(usize, f64); 1] = [(100, 1.0)];
 
 /// What the name of a start ends with that is followed in the coordinates of the objective too.
 pub(in crate::estimate) const TWIN: &str = "-orthogonal";
@@ -117,7 +116,7 @@ impl Job<'_> {
                 let twins: Vec<Start> =
                     starts.iter().filter(|start| has_f && start.cost.is_finite()).map(Start::twin).collect();
                 starts.extend(twins);
-                let rounds = if has_f { &ROUNDS } else { &LONG_ROUNDS };
+                let rounds = if has_f { &ROUNDS[..] } else { &LONG_ROUND };
                 self.compare(predictor, &mut starts, rounds)?;
             }
             sort(&mut starts);

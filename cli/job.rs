@@ -23,6 +23,7 @@ use std::str::FromStr;
 use thetahat::data::{Interpolation, Resample, Rows};
 use thetahat::respond::InitialCondition;
 use thetahat::thetahat_core::nalgebra::Complex;
+use thetahat_table::Header;
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
@@ -100,10 +101,15 @@ impl LogJob {
         let options = thetahat_table::Options {
             delimiter: log.delimiter.as_deref().map(|text| byte("--delimiter", text)).transpose()?,
             decimal_comma: log.decimal_comma,
-            header: !log.no_header,
+            header: match log.header_row {
+                Some(line) => Header::Line(line),
+                None if log.no_header => Header::None,
+                None => Header::Recognised,
+            },
             skip_rows: log.skip_rows,
             comment: log.comment.as_deref().map(|text| byte("--comment", text)).transpose()?,
             missing: log.missing.clone(),
+            values: log.value.iter().map(|text| value(text)).collect::<Result<_, _>>()?,
             encoding: encoding.transpose()?,
             time_format: clock.time_format.clone(),
             bound: None,
@@ -236,12 +242,23 @@ fn resampling(text: &str) -> Result<Resample, Failure> {
     Ok(Resample { step: step.parse().map_err(|_| wrong())?, interpolation, anti_alias })
 }
 
+/// WORD=NUMBER.
+fn value(text: &str) -> Result<(String, f64), Failure> {
+    let parts =
+        text.rsplit_once('=').and_then(|(word, number)| Some((word.trim(), number.trim().parse().ok()?)));
+    match parts {
+        Some((word, number)) if !word.is_empty() && f64::is_finite(number) => Ok((word.to_owned(), number)),
+        _ => Err(Failure::usage(format!("--value {text}: write it as WORD=NUMBER, such as auto=1"))),
+    }
+}
+
 /// One ASCII character, or a name for it.
 fn byte(argument: &str, text: &str) -> Result<u8, Failure> {
     match (text, text.as_bytes()) {
         ("tab" | "\\t", _) => Ok(b'\t'),
         ("comma", _) => Ok(b','),
         ("semicolon", _) => Ok(b';'),
+        ("blanks", _) => Ok(b' '),
         (_, [byte]) if byte.is_ascii() => Ok(*byte),
         _ => Err(Failure::usage(format!("{argument} {text}: give one ASCII character, or tab"))),
     }

@@ -399,11 +399,6 @@ fn selected(
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();
     let mut words = Vec::new();
-    if job.options.header && header.iter().all(|name| name.trim().parse::<f64>().is_ok()) {
-        words.push(format!(
-            "{file}: the names of all columns are numbers; if the first row is data, read it with --no-header"
-        ));
-    }
     let time = match &job.clock {
         Clock::Column { name, .. } => Some(find(name, header).map_err(bad)?),
         Clock::Fixed(_) => None,

@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 90] = [
+pub(crate) const OPTIONS: [&str; 92] = [
     "alarm",
     "alpha",
     "alphas",
@@ -32,6 +32,7 @@ pub(crate) const OPTIONS: [&str; 90] = [
     "future",
     "gain",
     "half-width",
+    "header-row",
     "hold",
     "horizon",
     "initial",
@@ -89,6 +90,7 @@ pub(crate) const OPTIONS: [&str; 90] = [
     "trend",
     "units",
     "validate",
+    "value",
     "want",
     "weighting",
     "what",

@@ -99,19 +99,20 @@ fn a_row_cut_off_at_the_end_of_the_file() {
 #[test]
 fn a_word_where_a_number_should_be() {
     refused(with_line(13, "1,oops"), "", 3, &["log.csv:13:3: ", "'y'", "\"oops\"", "--missing oops"]);
-    refused(with_line(13, "--,2"), "", 3, &["log.csv:13:1: ", "'u'", "\"--\"", "--missing='--'"]);
+    refused(with_line(13, "-x,2"), "", 3, &["log.csv:13:1: ", "'u'", "\"-x\"", "--missing='-x'"]);
     refused(with_line(13, "\"1\",\"a,b\""), "", 3, &["log.csv:13:5: ", "\"a,b\""]);
     refused(with_line(13, "0x10,2"), "", 3, &["log.csv:13:1: "]);
 }
 
 #[test]
 fn a_row_of_units() {
-    refused(with_line(2, "V,degC"), "", 3, &["log.csv:2:1: ", "--skip-rows"]);
+    refused(with_line(2, "V,17"), "", 3, &["log.csv:2:1: ", "--skip-rows"]);
 }
 
 #[test]
 fn decimal_commas_that_were_not_announced() {
-    refused(plain_log().replace(',', ";").replace('.', ","), "", 3, &["log.csv:2:1: ", "--decimal-comma"]);
+    let log = plain_log().replace(',', ";").replace('.', ",");
+    refused(log, "--decimal-comma=no", 3, &["log.csv:2:1: ", "--decimal-comma"]);
 }
 
 #[test]

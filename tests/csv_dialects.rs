@@ -43,14 +43,19 @@ fn semicolons_and_tabs() {
     }
     assert_same(plain_log().replace(',', "|"), "--delimiter |");
     assert_same(plain_log().replace(',', " "), "--delimiter ' '");
+    assert_same(plain_log().replace(',', "   "), "--delimiter blanks");
+    assert_same(plain_log().replace(',', " \t "), "");
+    assert_same(format!("sep=;\n{}", plain_log().replace(',', ";")), "");
     assert_same(plain_log().replace(',', "\t"), "--delimiter tab");
 }
 
 #[test]
 fn decimal_commas() {
     let log = plain_log().replace(',', ";").replace('.', ",");
-    assert_same(&log, "--decimal-comma");
-    assert_same(log.replace(';', "\t"), "--decimal-comma");
+    for options in ["--decimal-comma", "--decimal-comma=yes", ""] {
+        assert_same(&log, options);
+        assert_same(log.replace(';', "\t"), options);
+    }
 }
 
 #[test]
@@ -58,7 +63,8 @@ fn quoted_fields() {
     assert_same(rewritten(|line| format!("\"{}\"\n", line.replace(',', "\",\""))), "");
     // Decimal commas within quotes.
     let quoted = rewritten(|line| format!("\"{}\"\n", line.replace(',', "\";\"").replace('.', ",")));
-    assert_same(quoted, "--decimal-comma");
+    assert_same(&quoted, "--decimal-comma");
+    assert_same(quoted, "");
 }
 
 #[test]
@@ -133,6 +139,7 @@ fn comments() {
         "# made by hand; with care, 2024\n".to_owned() + &plain_log().replacen("\n", "\n# units: V, m\n", 1);
     assert_same(&log, "--comment #");
     assert_same(log.replace('#', "%"), "--comment %");
+    assert_same(&log, "");
     assert_same(log + "# the end\n", "--comment #");
 }
 
@@ -140,6 +147,16 @@ fn comments() {
 fn a_row_of_units() {
     assert_same(plain_log().replacen('\n', "\nV,rad/s\n", 1), "--skip-rows 1");
     assert_same(plain_log().replacen('\n', "\nV,rad/s\n-,-\n", 1), "--skip-rows 2");
+    let told = |log: String, words: &str| {
+        let run = Folder::with_log(log).run(&format!("fit log.csv {FIT}"));
+        assert_eq!(run.code, 0, "{}", run.stderr);
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    };
+    told(plain_log().replacen('\n', "\nV,rad/s\n", 1), "log.csv: line 2 is read as units; --skip-rows says");
+    told(
+        format!("Logger 12\n\n{}", plain_log()),
+        "log.csv: the names are on line 3, and what is above is left out; --header-row",
+    );
 }
 
 #[test]

@@ -41,16 +41,28 @@ impl Names {
 /// How a log is written.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArguments {
-    /// What separates fields: a character, or tab [default: recognised among comma, semicolon and tab]
+    /// What separates fields: a character, tab, or blanks for runs of them [default: recognised among comma, semicolon, tab and
+    /// blanks]
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
     pub(crate) delimiter: Option<String>,
-    /// Numbers have a decimal comma
-    #[arg(long, help_heading = "Log format")]
-    pub(crate) decimal_comma: bool,
+    /// Numbers have a decimal comma, or =no, a point [default: recognised by the first rows]
+    #[arg(
+        long,
+        value_name = "yes|no",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "yes",
+        value_parser = clap::builder::BoolishValueParser::new(),
+        help_heading = "Log format"
+    )]
+    pub(crate) decimal_comma: Option<bool>,
+    /// The line that has the names of the columns; what is above is left out [default: the last line of words above the rows]
+    #[arg(long, value_name = "LINE", conflicts_with = "no_header", help_heading = "Log format")]
+    pub(crate) header_row: Option<u64>,
     /// The first row is data; columns are called 1, 2, …
     #[arg(long, help_heading = "Log format")]
     pub(crate) no_header: bool,
-    /// Leave out this many rows below the header, such as a row of units
+    /// Leave out this many rows below the names; units are recognised
     #[arg(
         long,
         value_name = "N",
@@ -62,9 +74,13 @@ pub(crate) struct LogArguments {
     /// Lines that start with this character are comments
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
     pub(crate) comment: Option<String>,
-    /// One more word that stands for a missing value, besides empty fields, NaN, NA, N/A and null
+    /// One more word that stands for a missing value, besides empty fields, NaN, NA, N/A, null, and what historians and
+    /// spreadsheets write
     #[arg(long, value_name = "TOKEN", allow_hyphen_values = true, help_heading = "Log format")]
     pub(crate) missing: Vec<String>,
+    /// A word that stands for a number, such as auto=1, besides words for off and on
+    #[arg(long, value_name = "WORD=NUMBER", allow_hyphen_values = true, help_heading = "Log format")]
+    pub(crate) value: Vec<String>,
     /// The text's encoding, such as latin1 [default: UTF-8, or what a byte-order mark says]
     #[arg(long, value_name = "NAME", help_heading = "Log format")]
     pub(crate) encoding: Option<String>,

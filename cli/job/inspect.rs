@@ -102,11 +102,19 @@ impl InspectJob {
             }
         }
         log.missing.iter().for_each(|token| option("--missing", token));
+        log.value.iter().for_each(|value| option("--value", value));
+        if let Some(line) = log.header_row {
+            option("--header-row", &line.to_string());
+        }
         if log.skip_rows > 0 {
             option("--skip-rows", &log.skip_rows.to_string());
         }
         option("--report", "model.json");
-        let flags = [("--decimal-comma", log.decimal_comma), ("--no-header", log.no_header)];
+        let flags = [
+            ("--decimal-comma", log.decimal_comma == Some(true)),
+            ("--decimal-comma=no", log.decimal_comma == Some(false)),
+            ("--no-header", log.no_header),
+        ];
         words.extend(flags.iter().filter(|(_, given)| *given).map(|(name, _)| (*name).to_owned()));
         Some(words.join(" "))
     }

@@ -56,11 +56,13 @@ impl StepArguments {
             ("sample-time", clock.sample_time.is_some()),
             ("resample", clock.resample.is_some()),
             ("delimiter", log.delimiter.is_some()),
-            ("decimal-comma", log.decimal_comma),
+            ("decimal-comma", log.decimal_comma.is_some()),
+            ("header-row", log.header_row.is_some()),
             ("no-header", log.no_header),
             ("skip-rows", log.skip_rows > 0),
             ("comment", log.comment.is_some()),
             ("missing", !log.missing.is_empty()),
+            ("value", !log.value.is_empty()),
             ("encoding", log.encoding.is_some()),
         ];
         let of_tests = [

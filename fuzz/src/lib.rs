@@ -29,7 +29,7 @@ use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
 use thetahat::track::{TrackPlan, TrackSummary, Tracker};
 use thetahat::tune::{Tuning, TuningPlan, tune};
-use thetahat_table::{Bound, Event, Options, Reader, Selection};
+use thetahat_table::{Bound, Event, Header, Options, Reader, Selection};
 
 /// The rows of the log that models meet.
 const ROWS: usize = 60;
@@ -44,7 +44,8 @@ pub fn table(bytes: &[u8]) {
     file.write_all(bytes).expect("room for a small file");
     let bound = Some(Bound::now(64));
     let plain = Options { bound, ..Options::default() };
-    let bare = Options { header: false, decimal_comma: true, comment: Some(b'#'), ..plain.clone() };
+    let bare =
+        Options { header: Header::None, decimal_comma: Some(true), comment: Some(b'#'), ..plain.clone() };
     for options in [plain, bare] {
         read(file.path(), &options);
     }

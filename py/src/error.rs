@@ -99,6 +99,13 @@ pub(crate) fn in_python(message: &str) -> String {
         match &option[..length] {
             "input" => text.push_str("inputs"),
             "no-header" => text.push_str("header=False"),
+            "header-row" => text.push_str("header"),
+            "value" => text.push_str("values"),
+            "decimal-comma" if option[length..].starts_with("=no") => {
+                text.push_str("decimal_comma=False");
+                rest = &option[length + "=no".len()..];
+                continue;
+            }
             "resample" => {
                 // `--resample 0.1:linear`.
                 let value = option[length..].strip_prefix(' ').unwrap_or_default();

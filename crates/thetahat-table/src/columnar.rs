@@ -25,7 +25,7 @@ use super::error::{Error, escaped, shortened};
 use super::lines::Lines;
 use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::source::{Bytes, Format};
-use super::{Options, Selection, Table};
+use super::{Header, Options, Selection, Table};
 use batches::{Batches, Opened};
 use clock::Clock;
 use values::{Kind, numbers};
@@ -259,11 +259,13 @@ impl ColumnarReader {
 fn text_option(options: &Options) -> Option<&'static str> {
     let given = [
         ("`delimiter`", options.delimiter.is_some()),
-        ("`decimal-comma`", options.decimal_comma),
-        ("`no-header`", !options.header),
+        ("`decimal-comma`", options.decimal_comma.is_some()),
+        ("`no-header`", options.header == Header::None),
+        ("`header-row`", matches!(options.header, Header::Line(_))),
         ("`skip-rows`", options.skip_rows > 0),
         ("`comment`", options.comment.is_some()),
         ("`missing`", !options.missing.is_empty()),
+        ("`value`", !options.values.is_empty()),
         ("`encoding`", options.encoding.is_some()),
     ];
     given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)

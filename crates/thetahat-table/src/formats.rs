@@ -215,7 +215,7 @@ impl Stream {
     /// What the reader should know, in plain words, each once.
     pub fn words(&mut self) -> Vec<String> {
         match &mut self.0 {
-            AnyStream::Text(_) => Vec::new(),
+            AnyStream::Text(stream) => stream.words(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.words(),
         }

@@ -4,6 +4,8 @@ use super::dialect::Dialect;
 use super::error::{Error, Position, escaped, quoted, shortened};
 use super::number::starts_with_number;
 use super::record::Record;
+use super::shape::Column;
+use super::words::States;
 
 /// The file, its columns, and how its lines divide into fields.
 pub(super) struct Layout {
@@ -13,6 +15,10 @@ pub(super) struct Layout {
     pub(super) dialect: Dialect,
     /// The columns' names; their number is the number of fields in each row.
     pub(super) names: Vec<String>,
+    /// Whether what follows the last of these fields, such as a comment, is left out.
+    pub(super) is_open: bool,
+    /// What each column holds.
+    pub(super) columns: Vec<Column>,
 }
 
 /// A row that [`Record`] has read, and where it came from.
@@ -41,12 +47,22 @@ impl Layout {
         self.names.len()
     }
 
+    /// The two words of a column that holds nothing else.
+    pub(super) fn states(&self, column: usize) -> Option<States> {
+        self.columns.get(column)?.states
+    }
+
     /// A column as messages call it.
     pub(super) fn column(&self, index: usize) -> String {
         match self.names.get(index) {
             Some(name) if !name.is_empty() => format!("column '{}'", escaped(&shortened(name))),
             _ => format!("column {}", index + 1),
         }
+    }
+
+    /// What the reader should know of the file, in plain words.
+    pub(super) fn told(&self, words: &str) -> String {
+        format!("{}: {words}", escaped(&self.file))
     }
 
     /// An error at a field.
@@ -61,7 +77,15 @@ impl Layout {
         if starts_with_number(content) {
             return self.fault(row, field, message);
         }
-        let message = format!("{message}; if this row holds units, leave it out with `skip-rows`");
+        let words = self.columns.get(field).map_or(&[][..], |column| &column.words);
+        let message = match words {
+            [first, _, ..] => format!(
+                "this column holds words ({}), not numbers; say what each stands for (`value` {first}=0), or leave the column \
+                 out",
+                words.join(", ")
+            ),
+            _ => format!("{message}; if this row holds units, leave it out with `skip-rows`"),
+        };
         self.fault(row, field, &message)
     }
 
@@ -75,6 +99,8 @@ impl Layout {
             } else {
                 "if it has decimal commas, separate its fields by semicolons and say `decimal-comma`"
             }
+        } else if matches!(row.text.trim_ascii_start().first(), Some(b'#' | b'%' | b'/' | b'!' | b'*')) {
+            "if this line is a comment, say `comment` and its first character"
         } else if first.starts_with(['#', '%', '/']) && width < found {
             "if the first line is a comment, say `comment` and its first character"
         } else if found > width && row.record.field(found - 1).trim_ascii().is_empty() {
@@ -89,7 +115,10 @@ impl Layout {
             counted(found, "field"),
             if width == 1 { "is" } else { "are" },
             counted(width, "column"),
-            quoted(&[self.dialect.delimiter]),
+            match self.dialect.blanks {
+                true => "a run of blanks".to_owned(),
+                false => quoted(&[self.dialect.delimiter]),
+            },
         );
         Error::data(&self.file, row.position_of(found.min(width), self.dialect), message)
     }

@@ -10,8 +10,8 @@
 //!
 //! let path = std::env::temp_dir().join(format!("thetahat-table-{}.csv", std::process::id()));
 //! std::fs::write(&path, "t;u;y\n0;1,5;2\n1;;3\n")?;
-//! // The delimiter is recognised; what cannot be is said.
-//! let reader = Reader::open(&path, &Options { decimal_comma: true, ..Options::default() })?;
+//! // The delimiter and the decimal comma are recognised.
+//! let reader = Reader::open(&path, &Options::default())?;
 //! assert_eq!(reader.names(), ["t", "u", "y"]);
 //!
 //! let selection = Selection { columns: vec![1, 2], time: Some(0) };
@@ -27,16 +27,18 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What is understood of texts: commas, semicolons or tabs, recognised by themselves; quotes as in RFC 4180; lines that end with LF,
-//! CR LF or CR; blank lines and comments; decimal commas; gzip; UTF-16 with a byte-order mark and other encodings by name; times
-//! as seconds, as ISO 8601 or in a given format.
+//! What is understood of texts, by itself: commas, semicolons, tabs or runs of blanks between fields; quotes as in RFC 4180; lines
+//! that end with LF, CR LF or CR; blank lines, and lines above the names; units below them; comments; decimal commas, groups of digits
+//! and percent signs; words for off and on, and for missing values; gzip; UTF-16 with a byte-order mark. Other encodings by name;
+//! times as seconds, as ISO 8601 or in a given format.
 //!
 //! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call it:
 //! `decimal-comma`.
 //!
-//! What is not done here: the order of the times is not checked, names may repeat, and runs of blanks do not
-//! separate fields. The crate knows nothing of models, nor of terminals.
+//! What is not done here: the order of the times is not checked, and names may repeat. The crate knows nothing of models, nor of
+//! terminals.
 
+mod blanks;
 mod block;
 #[cfg(feature = "columnar")]
 mod columnar;
@@ -53,11 +55,13 @@ mod number;
 mod reader;
 mod record;
 mod rows;
+mod shape;
 mod source;
 mod stream;
 #[cfg(test)]
 mod tests;
 mod time;
+mod words;
 
 pub use error::{Error, ErrorKind, remedy};
 pub use formats::{Reader, Stream};
@@ -66,44 +70,42 @@ pub use mailbox::{Event, Waker};
 pub use memory::Bound;
 pub use names::{list, names};
 
+/// Where a log has the names of its columns.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub enum Header {
+    /// On the last line of words above the rows, or nowhere: then they are named `1`, `2`, and so on.
+    #[default]
+    Recognised,
+    /// On this line, counted from one.
+    Line(u64),
+    /// Nowhere: the first line is a row.
+    None,
+}
+
 /// How a log is written, as far as it is not recognised by itself.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The byte between two fields; recognised from the first rows if it is not given.
+    /// The byte between two fields; recognised from the first rows if it is not given. A space stands for runs of blanks and tabs.
     pub delimiter: Option<u8>,
-    /// Whether numbers are written with a decimal comma.
-    pub decimal_comma: bool,
-    /// Whether the first row names the columns. Without a header they are named `1`, `2`, and so on.
-    pub header: bool,
-    /// How many rows below the header are left out: units, for example.
+    /// Whether numbers are written with a decimal comma; recognised from the first rows if it is not given.
+    pub decimal_comma: Option<bool>,
+    /// Where the names of the columns are.
+    pub header: Header,
+    /// How many rows below the names are left out; units are recognised.
     pub skip_rows: usize,
     /// The first character of a line that is a comment.
     pub comment: Option<u8>,
-    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`. Case does
-    /// not matter, and a number stands for all ways to write it.
+    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`, and besides what historians and
+    /// spreadsheets write, such as `Bad` and `#N/A`. Case does not matter, and a number stands for all ways to write it.
     pub missing: Vec<String>,
+    /// Words that stand for numbers, besides pairs such as `off` and `on`.
+    pub values: Vec<(String, f64)>,
     /// The encoding of the text, if it is neither UTF-8 nor marked as UTF-16.
     pub encoding: Option<&'static encoding_rs::Encoding>,
     /// How times are written, in the manner of strptime, if they are neither seconds nor ISO 8601.
     pub time_format: Option<String>,
     /// What memory there is for; times count as values, too.
     pub bound: Option<Bound>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            delimiter: None,
-            decimal_comma: false,
-            header: true,
-            skip_rows: 0,
-            comment: None,
-            missing: Vec::new(),
-            encoding: None,
-            time_format: None,
-            bound: None,
-        }
-    }
 }
 
 impl Options {
@@ -115,7 +117,7 @@ impl Options {
         let shown = |byte: u8| error::quoted(&[byte]);
         match (self.delimiter, self.comment) {
             (Some(delimiter), _) if unusable(delimiter) => Err(format!(
-                "{} cannot be the delimiter; use a comma, a semicolon or a tab",
+                "{} cannot be the delimiter; use a comma, a semicolon, a tab or a space",
                 shown(delimiter)
             )),
             (_, Some(comment)) if unusable(comment) || comment.is_ascii_whitespace() => {
@@ -124,7 +126,7 @@ impl Options {
             (Some(delimiter), Some(comment)) if delimiter == comment => {
                 Err(format!("{} cannot both delimit fields and start a comment", shown(comment)))
             }
-            (Some(b','), _) if self.decimal_comma => {
+            (Some(b','), _) if self.decimal_comma == Some(true) => {
                 Err("a comma cannot be both the delimiter and the decimal comma; separate fields by ;"
                     .to_owned())
             }

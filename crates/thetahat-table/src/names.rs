@@ -3,7 +3,7 @@
 use super::dialect::Dialect;
 use super::record::Record;
 
-const COMMAS: Dialect = Dialect { delimiter: b',', comment: None };
+const COMMAS: Dialect = Dialect { delimiter: b',', comment: None, blanks: false };
 
 /// The names in a list: between commas, and between double quotes where a name holds a comma.
 ///

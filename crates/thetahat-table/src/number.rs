@@ -18,6 +18,10 @@ pub(super) const NUL_BYTE: &str =
 #[derive(Clone, Debug)]
 pub(super) struct Numbers {
     decimal_comma: bool,
+    /// Whether `1,234`, or with decimal commas `1.234`, is a number of four digits: others in the log show it.
+    grouped: bool,
+    /// Words that stand for numbers, as they were declared.
+    values: Vec<(String, f64)>,
     /// The declared words for a missing value.
     missing_words: Vec<String>,
     /// Those of them that are numbers: `-999` is meant to cover `-999.0` too.
@@ -29,12 +33,20 @@ impl Numbers {
     pub(super) fn new(decimal_comma: bool, missing: &[String]) -> Self {
         let mut numbers = Self {
             decimal_comma,
+            grouped: false,
+            values: Vec::new(),
             missing_words: missing.iter().map(|word| word.trim().to_owned()).collect(),
             missing_numbers: Vec::new(),
         };
         numbers.missing_numbers =
             numbers.missing_words.iter().filter_map(|word| numbers.finite(word.as_bytes())).collect();
         numbers
+    }
+
+    /// The same with groups of digits, and with words that stand for numbers.
+    pub(super) fn with(self, grouped: bool, values: &[(String, f64)]) -> Self {
+        let values = values.iter().map(|(word, value)| (word.trim().to_owned(), *value)).collect();
+        Self { grouped, values, ..self }
     }
 
     /// Whether numbers have a decimal point and none of them stands for a missing value.
@@ -62,8 +74,14 @@ impl Numbers {
         match self.finite(field) {
             Some(value) => Ok(self.without_missing(value)),
             None if self.is_missing(field) => Ok(f64::NAN),
-            None => Err(self.refusal(field)),
+            None => self.declared(field).ok_or_else(|| self.refusal(field)),
         }
+    }
+
+    /// What a word stands for that was declared.
+    fn declared(&self, field: &[u8]) -> Option<f64> {
+        let known = self.values.iter().find(|(word, _)| field.eq_ignore_ascii_case(word.as_bytes()));
+        known.map(|(_, value)| *value)
     }
 
     /// Whether a field stands for a missing value.
@@ -82,12 +100,29 @@ impl Numbers {
     /// A finite number that fills a field.
     fn finite(&self, field: &[u8]) -> Option<f64> {
         let value = if self.decimal_comma { parsed_with_comma(field) } else { parsed(field) };
-        value.filter(|value| value.is_finite())
+        value.or_else(|| self.dressed(field)).filter(|value| value.is_finite())
     }
 
-    /// Whether a field is infinite, or would be a number with the other decimal sign.
+    /// A number with a percent sign after it, or with its digits in groups of three.
+    fn dressed(&self, field: &[u8]) -> Option<f64> {
+        if !matches!(field, [b'0'..=b'9' | b'-' | b'+' | b'.' | b',', _, ..]) {
+            return None;
+        }
+        let bare = field.strip_suffix(b"%").map_or(field, <[u8]>::trim_ascii_end);
+        let read = if self.decimal_comma { parsed_with_comma } else { parsed };
+        if bare.len() < field.len()
+            && let Some(value) = read(bare)
+        {
+            return Some(value);
+        }
+        let Digits { plain, groups, certain } = Digits::of(bare, self.decimal_comma)?;
+        let trusted = groups > 0 && (certain || self.grouped);
+        trusted.then(|| read(&plain)).flatten()
+    }
+
+    /// Whether a field is infinite, or would be a number if numbers were written in another way.
     pub(super) fn is_nearly(&self, field: &[u8]) -> bool {
-        parsed(field).is_some() || parsed_with_comma(field).is_some()
+        parsed(field).is_some() || parsed_with_comma(field).is_some() || Notation::of(field).is_some()
     }
 
     /// Says why a field is no number, and what to do.
@@ -107,18 +142,101 @@ impl Numbers {
             format!("{shown} is infinite; correct it, or {missing}")
         } else if self.decimal_comma && parsed(field).is_some() {
             format!(
-                "{shown} has a decimal point, yet `decimal-comma` was given; correct it, or leave that option \
-                 out"
+                "{shown} has a decimal point where others have a comma; correct it, or say `decimal-comma`=no"
             )
-        } else if parsed_with_comma(field).is_some_and(f64::is_finite) {
+        } else if !self.decimal_comma && parsed_with_comma(field).is_some_and(f64::is_finite) {
             format!("{shown} is not a number; if it has a decimal comma, say `decimal-comma`")
         } else if field.split(u8::is_ascii_whitespace).filter_map(|part| self.finite(part)).nth(1).is_some() {
-            format!(
-                "{shown} is not one number; say `delimiter` ' ' if one blank separates two fields, and put one \
-                 in place of several"
-            )
+            format!("{shown} is not one number; say `delimiter` ' ' if blanks separate fields")
         } else {
             format!("{shown} is not a number; correct it, or {missing}")
+        }
+    }
+}
+
+/// A number without the signs that group its digits.
+struct Digits {
+    plain: Vec<u8>,
+    /// How many groups of three digits follow such a sign.
+    groups: usize,
+    /// Whether nothing but groups can be meant: `1,234` may have decimals.
+    certain: bool,
+}
+
+impl Digits {
+    /// Digits in groups of three before the decimal sign; none if the groups are others.
+    fn of(field: &[u8], decimal_comma: bool) -> Option<Self> {
+        let (decimal, other) = if decimal_comma { (b',', b'.') } else { (b'.', b',') };
+        let end = field.iter().position(|&byte| byte == decimal || byte == b'e' || byte == b'E');
+        let (whole, rest) = field.split_at(end.unwrap_or(field.len()));
+        let (mut plain, mut groups, mut since, mut separator) = (Vec::new(), 0, 0, None);
+        let mut left = whole;
+        while let Some((&byte, after)) = left.split_first() {
+            // A no-break space, and a narrow one, in UTF-8.
+            let wide: [&[u8]; 2] = [b"\xc2\xa0", b"\xe2\x80\xaf"];
+            let length = wide.iter().find(|wide| left.starts_with(wide)).map_or(1, |wide| wide.len());
+            if length > 1 || [other, b' ', b'\''].contains(&byte) {
+                let first = groups == 0 && (1..=3).contains(&since);
+                if !(first || groups > 0 && since == 3) || separator.is_some_and(|known| known != byte) {
+                    return None;
+                }
+                (groups, since, separator) = (groups + 1, 0, Some(byte));
+                left = &left[length..];
+                continue;
+            }
+            since += usize::from(byte.is_ascii_digit());
+            plain.push(byte);
+            left = after;
+        }
+        if groups > 0 && since != 3 {
+            return None;
+        }
+        plain.extend_from_slice(rest);
+        let certain = groups > 1 || rest.first() == Some(&decimal) || separator != Some(other);
+        Some(Self { plain, groups, certain })
+    }
+}
+
+/// What a number shows of how numbers are written.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Notation {
+    /// Nothing: it is a whole number.
+    Either,
+    /// It has a decimal point, or a comma, and perhaps groups of digits.
+    Point {
+        grouped: bool,
+    },
+    Comma {
+        grouped: bool,
+    },
+    /// A comma, or a point, before three digits.
+    OneComma,
+    OnePoint,
+}
+
+impl Notation {
+    /// What a field shows; none if it is no number in any notation.
+    pub(super) fn of(field: &[u8]) -> Option<Self> {
+        let bare = field.strip_suffix(b"%").map_or(field, <[u8]>::trim_ascii_end);
+        if !matches!(bare.first()?, b'0'..=b'9' | b'-' | b'+' | b'.' | b',') {
+            return None;
+        }
+        let groups = |decimal_comma| Digits::of(bare, decimal_comma).filter(|digits| digits.groups > 0);
+        let reads = |digits: &Digits, read: fn(&[u8]) -> Option<f64>| read(&digits.plain).is_some();
+        let (point, comma) = (groups(false), groups(true));
+        let point = point.filter(|digits| reads(digits, parsed));
+        let comma = comma.filter(|digits| reads(digits, parsed_with_comma));
+        match (point, comma, parsed(bare), parsed_with_comma(bare)) {
+            (Some(digits), None, None, None) if digits.certain => Some(Self::Point { grouped: true }),
+            (None, Some(digits), None, None) if digits.certain => Some(Self::Comma { grouped: true }),
+            // By blanks or apostrophes, without decimals.
+            (Some(_), Some(_), None, None) => Some(Self::Either),
+            (Some(_), _, None, Some(_)) => Some(Self::OneComma),
+            (_, Some(_), Some(_), None) => Some(Self::OnePoint),
+            (_, _, Some(_), Some(_)) => Some(Self::Either),
+            (_, _, Some(_), None) => Some(Self::Point { grouped: false }),
+            (_, _, None, Some(_)) => Some(Self::Comma { grouped: false }),
+            _ => None,
         }
     }
 }
@@ -230,9 +348,68 @@ mod tests {
         assert_eq!(numbers.read(format!("1,{}", "0".repeat(99)).as_bytes()), Ok(1.0));
         assert!(numbers.read(b"-99,50").is_ok_and(f64::is_nan));
         assert!(numbers.read(b"1.5").is_err_and(|message| message.contains("decimal point")));
-        assert!(numbers.read(b"1.234,5").is_err());
         assert!(numbers.read(b"1,2,3").is_err());
         assert!(read("1,5").is_err_and(|message| message.contains("`decimal-comma`")));
+    }
+
+    #[test]
+    fn digits_come_in_groups() {
+        let read = |decimal_comma, grouped, field: &str| {
+            Numbers::new(decimal_comma, &[]).with(grouped, &[]).read(field.as_bytes())
+        };
+        for field in
+            ["1,234.5", "1 234.5", "1'234.5", "1\u{a0}234.5", "1\u{202f}234.5", "1234.5 %", "1,234.5%"]
+        {
+            assert_eq!(read(false, false, field), Ok(1234.5), "{field}");
+        }
+        assert_eq!(read(false, false, "-1,234,567"), Ok(-1_234_567.0));
+        assert_eq!(read(true, false, "1.234,5"), Ok(1234.5));
+        assert_eq!(read(true, false, "-12.345.678"), Ok(-12_345_678.0));
+        assert_eq!(read(true, false, "12,5%"), Ok(12.5));
+        // It may be either: others have to show it.
+        assert!(read(false, false, "1,234").is_err_and(|message| message.contains("`decimal-comma`")));
+        assert_eq!(read(false, true, "1,234"), Ok(1234.0));
+        assert_eq!(read(true, true, "1.234"), Ok(1234.0));
+        for field in
+            ["1,23,456.0", "1,2345.0", "12345,678.5", ",123.5", "1,234 567.0", "%", "1,234.5,6", "1 23"]
+        {
+            assert!(read(false, true, field).is_err(), "{field}");
+        }
+    }
+
+    #[test]
+    fn a_number_shows_how_numbers_are_written() {
+        use Notation::{Comma, Either, OneComma, OnePoint, Point};
+        for (field, notation) in [
+            ("15", Some(Either)),
+            ("-1e5", Some(Either)),
+            ("1 234", Some(Either)),
+            ("1.5", Some(Point { grouped: false })),
+            ("1,5", Some(Comma { grouped: false })),
+            ("0,5 %", Some(Comma { grouped: false })),
+            ("1,234.5", Some(Point { grouped: true })),
+            ("1,234,567", Some(Point { grouped: true })),
+            ("1.234,5", Some(Comma { grouped: true })),
+            ("1.234.567", Some(Comma { grouped: true })),
+            ("1,234", Some(OneComma)),
+            ("1.234", Some(OnePoint)),
+            ("12,2345", Some(Comma { grouped: false })),
+            ("27.10.2024", None),
+            ("abc", None),
+            ("1,5,6", None),
+            ("", None),
+        ] {
+            assert_eq!(Notation::of(field.as_bytes()), notation, "{field}");
+        }
+    }
+
+    #[test]
+    fn declared_words_are_numbers() {
+        let numbers =
+            Numbers::new(false, &[]).with(false, &[("manual".to_owned(), 0.0), (" auto ".to_owned(), 1.0)]);
+        assert_eq!(numbers.read(b"Auto"), Ok(1.0));
+        assert_eq!(numbers.read(b"manual"), Ok(0.0));
+        assert!(numbers.read(b"off").is_err());
     }
 
     #[test]

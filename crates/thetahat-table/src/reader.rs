@@ -1,19 +1,21 @@
 //! Reading a text table from its first byte to its last.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 use memchr::{memchr, memchr_iter, memrchr};
 
 use super::block::Block;
-use super::dialect::Dialect;
 use super::error::{Error, Position, quoted};
 use super::layout::{Layout, Row};
 use super::number::{NUL_BYTE, Numbers};
 use super::record::Record;
 use super::rows::{Plan, Rows};
+use super::shape::{self, Column, Shape};
 use super::source::Source;
-use super::stream::{Text, TextStream, has_lines};
+use super::stream::{Text, TextStream};
 use super::time::Clock;
+use super::words::Tally;
 use super::{Options, Selection, Table};
 
 /// How much is held in memory and handled at a time, in bytes.
@@ -27,8 +29,8 @@ pub(super) struct Sizes {
     pub(super) row: usize,
 }
 
-/// This many rows say whether a column holds numbers.
-const LOOKED_AT: usize = 1000;
+/// How much of a text is looked at before it is read.
+const HEAD: usize = 1 << 18;
 
 /// The sizes for real files.
 pub(super) const SIZES: Sizes = Sizes { block: 1 << 20, piece: 1 << 17, row: 1 << 24 };
@@ -41,6 +43,9 @@ pub(super) struct TextReader {
     layout: Layout,
     /// The errors to report if a column with such a name is used.
     undecoded_names: Vec<(usize, Error)>,
+    numbers: Numbers,
+    /// What the reader should know, in plain words.
+    told: Vec<String>,
     /// The text at hand, and space for the text after it.
     current: Block,
     next: Block,
@@ -55,56 +60,88 @@ impl TextReader {
     /// Reads a stream as far as its first row, and nothing that it would have to wait for: it may be a pipe on which the next row
     /// is yet to come. For [`stream`](TextReader::stream).
     pub(super) fn start_live(mut source: Source, options: &Options) -> Result<Self, Error> {
-        let lines = usize::from(options.header) + options.skip_rows + 1;
-        let head = source.look_ahead(SIZES.row, |text| has_lines(text, lines, options.comment))?;
-        Self::start(source, options, Sizes { block: head, ..SIZES })
+        let head = source.look_ahead(SIZES.row, |text| shape::has_row(text, options));
+        let sizes = Sizes { block: head.len(), ..SIZES };
+        Self::begin(source, head, options, sizes)
     }
 
     /// Reads a stream as far as its first row.
     pub(super) fn start(mut source: Source, options: &Options, sizes: Sizes) -> Result<Self, Error> {
+        let head = source.look_ahead(HEAD, |_| false);
+        Self::begin(source, head, options, sizes)
+    }
+
+    /// Reads a stream of which `head` is the beginning as far as its first row.
+    fn begin(mut source: Source, mut head: Vec<u8>, options: &Options, sizes: Sizes) -> Result<Self, Error> {
         let file = source.name().to_owned();
+        if let Some(offset) = memchr(0, &head) {
+            return Err(Error::data(&file, Position::within(&head, offset, 1), NUL_BYTE));
+        }
+        // Whole lines; a text may end without a line break, or be one long line.
+        match memrchr(b'\n', &head) {
+            Some(newline) if head.len() >= HEAD => head.truncate(newline + 1),
+            _ if head.last().is_some_and(|&byte| byte != b'\n') => head.push(b'\n'),
+            _ => {}
+        }
+        let shape = Shape::recognise(&head, options).map_err(|message| Error::data(&file, None, message))?;
+        if shape.dialect.blanks {
+            source.separate_at_blanks();
+        }
         let mut current = Block::default();
-        current.fill(&[], sizes.block, &mut source)?;
-        let text = current.text();
-        if text.is_empty() {
+        current.fill(&[], sizes.block.max(1), &mut source)?;
+        if current.text().is_empty() {
             return Err(Error::data(&file, None, "the file is empty; record at least one row"));
         }
-        if let Some(offset) = memchr(0, text) {
-            return Err(Error::data(&file, Position::within(text, offset, 1), NUL_BYTE));
-        }
-        let dialect = match options.delimiter {
-            Some(delimiter) => Dialect { delimiter, comment: options.comment },
-            None => Dialect::recognise(text, options.comment, options.decimal_comma),
-        };
+        let Shape { dialect, start, line, columns, .. } = shape;
+        let numbers =
+            Numbers::new(shape.decimal_comma, &options.missing).with(shape.grouped, &options.values);
         let mut reader = Self {
             options: options.clone(),
             sizes,
             source,
-            layout: Layout { file, dialect, names: Vec::new() },
+            layout: Layout { file, dialect, names: Vec::new(), is_open: shape.width.is_some(), columns },
             undecoded_names: Vec::new(),
+            numbers,
+            told: Vec::new(),
             current,
             next: Block::default(),
             record: Record::new(dialect.delimiter),
             position: 0,
             length: 0,
-            line: 1,
+            line,
         };
-        reader.read_head()?;
+        reader.told = shape.words.iter().map(|words| reader.layout.told(words)).collect();
+        reader.pass(start)?;
+        reader.read_head(shape.has_names, shape.left_out, shape.width)?;
         Ok(reader)
     }
 
-    /// Reads the names of the columns and stops at the first row.
-    fn read_head(&mut self) -> Result<(), Error> {
-        if self.options.header {
+    /// Goes on by some bytes.
+    fn pass(&mut self, mut bytes: usize) -> Result<(), Error> {
+        while bytes > self.current.text().len() && !self.current.is_last() {
+            bytes -= self.current.text().len();
+            self.next.fill(&[], self.sizes.block, &mut self.source)?;
+            std::mem::swap(&mut self.current, &mut self.next);
+        }
+        self.position = bytes.min(self.current.text().len());
+        Ok(())
+    }
+
+    /// Reads the names of the columns, leaves out what is between them and the first row, and stops there.
+    fn read_head(&mut self, has_names: bool, left_out: usize, width: Option<usize>) -> Result<(), Error> {
+        if has_names {
             self.advance()?;
             self.read_names();
         }
-        for _ in 0..self.options.skip_rows {
+        for _ in 0..left_out {
             self.advance()?;
         }
         self.advance()?;
-        if !self.options.header {
+        if !has_names {
             self.layout.names = (1..=self.record.len()).map(|number| number.to_string()).collect();
+        }
+        if let Some(width) = width {
+            self.layout.names.truncate(width);
         }
         Ok(())
     }
@@ -168,31 +205,8 @@ impl TextReader {
     /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
     /// is a number, and not all are missing.
     pub(super) fn words(&self) -> Vec<bool> {
-        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
-        let dialect = self.layout.dialect;
-        let mut text = &self.current.text()[self.position..];
-        let mut record = Record::new(dialect.delimiter);
-        let (mut numeric, mut other) = (vec![false; self.layout.width()], vec![false; self.layout.width()]);
-        let mut rows = 0;
-        while rows < LOOKED_AT {
-            if let Some(length) = dialect.skipped_line(text) {
-                text = &text[length..];
-            } else if let Some(length) = record.read(text) {
-                text = &text[length..];
-                rows += 1;
-                for (column, (numeric, other)) in numeric.iter_mut().zip(&mut other).enumerate() {
-                    if column < record.len() {
-                        let field = dialect.trimmed(record.field(column));
-                        let number = numbers.read(field).is_ok() || numbers.is_nearly(field);
-                        *numeric |= number && !numbers.is_missing(field);
-                        *other |= !number;
-                    }
-                }
-            } else {
-                break;
-            }
-        }
-        numeric.into_iter().zip(other).map(|(numeric, other)| other && !numeric).collect()
+        let of = |column| self.layout.columns.get(column).is_some_and(|column: &Column| column.no_numbers);
+        (0..self.layout.width()).map(of).collect()
     }
 
     /// The columns of which the name is not UTF-8 and cannot be shown.
@@ -209,13 +223,14 @@ impl TextReader {
         take: &mut dyn FnMut(Table) -> ControlFlow<()>,
     ) -> Result<(), Error> {
         let fields = self.fields(selection)?;
-        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
-        let (clock, start) = self.clock(selection, &numbers)?;
+        let (clock, start) = self.clock(selection)?;
         let Self {
             options,
             sizes,
             mut source,
             layout,
+            numbers,
+            told,
             mut current,
             mut next,
             mut record,
@@ -223,8 +238,16 @@ impl TextReader {
             line,
             ..
         } = self;
-        let plan = Plan { layout, numbers, clock, fields, time: selection.time };
+        let plan = Plan {
+            layout,
+            numbers,
+            clock,
+            fields,
+            time: selection.time,
+            has_statuses: AtomicBool::new(false),
+        };
         let mut rows = Rows::new(plan.fields.len(), line);
+        let mut tallies = vec![Tally::default(); plan.fields.len()];
         loop {
             let text = &current.text()[position..];
             let (whole, tail) = text.split_at(memrchr(b'\n', text).map_or(0, |newline| newline + 1));
@@ -254,7 +277,9 @@ impl TextReader {
                     return Err(plan.layout.unclosed(&row));
                 }
                 progress(source.bytes_read(), source.total());
-                let _ = take(plan.table(rows, selection, start));
+                let mut last = plan.table(rows, selection, start, &mut tallies);
+                last.words = told.into_iter().chain(plan.told()).chain(plan.counted(&tallies)).collect();
+                let _ = take(last);
                 return Ok(());
             }
             if left.len() > sizes.row {
@@ -267,7 +292,8 @@ impl TextReader {
             position = 0;
             if most.is_some_and(|most| rows.count >= most) {
                 let after = Rows::new(plan.fields.len(), rows.line);
-                let part = plan.table(std::mem::replace(&mut rows, after), selection, start.clone());
+                let part =
+                    plan.table(std::mem::replace(&mut rows, after), selection, start.clone(), &mut tallies);
                 if take(part).is_break() {
                     return Ok(());
                 }
@@ -285,17 +311,28 @@ impl TextReader {
         start: Option<&str>,
     ) -> Result<TextStream, Error> {
         let fields = self.fields(selection)?;
-        let numbers = Numbers::new(self.options.decimal_comma, &self.options.missing);
-        let (mut clock, mut first) = self.clock(selection, &numbers)?;
+        let (mut clock, mut first) = self.clock(selection)?;
         if let (Some(start), Clock::Calendar { .. }) = (start, &clock) {
-            clock = Clock::decide(start.as_bytes(), self.options.time_format.as_deref(), &numbers)
+            clock = Clock::decide(start.as_bytes(), self.options.time_format.as_deref(), &self.numbers)
                 .map_err(|message| Error::data(&self.layout.file, None, message))?;
             first = Some(start.to_owned());
         }
-        let Self { source, layout, current, position, line, .. } = self;
+        let Self { source, layout, numbers, mut told, current, position, line, .. } = self;
         let text = current.raw().get(position..).unwrap_or_default().to_vec();
-        let plan = Plan { layout, numbers, clock, fields, time: selection.time };
-        TextStream::begin(plan, selection, Text { text, line, source, whole_lines, start: first })
+        let plan = Plan {
+            layout,
+            numbers,
+            clock,
+            fields,
+            time: selection.time,
+            has_statuses: AtomicBool::new(false),
+        };
+        told.extend(plan.told());
+        TextStream::begin(
+            plan,
+            selection,
+            Text { text, line, source, whole_lines, start: first, words: told },
+        )
     }
 
     /// The selected fields in ascending order, if the selection makes sense.
@@ -317,13 +354,13 @@ impl TextReader {
     }
 
     /// Decides by the first row how times are written, and returns the first one if it is a date.
-    fn clock(&self, selection: &Selection, numbers: &Numbers) -> Result<(Clock, Option<String>), Error> {
+    fn clock(&self, selection: &Selection) -> Result<(Clock, Option<String>), Error> {
         let row = self.row();
         match selection.time {
             // A row of another width is refused when it is read.
             Some(index) if row.record.len() == self.layout.width() => {
                 let field = self.layout.dialect.trimmed(row.record.field(index));
-                let clock = Clock::decide(field, self.options.time_format.as_deref(), numbers)
+                let clock = Clock::decide(field, self.options.time_format.as_deref(), &self.numbers)
                     .map_err(|message| self.layout.first_fault(&row, index, &message))?;
                 let is_date = matches!(clock, Clock::Calendar { .. });
                 Ok((clock, is_date.then(|| String::from_utf8_lossy(field).into_owned())))

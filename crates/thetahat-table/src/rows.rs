@@ -9,16 +9,19 @@
 //! pieces up to the first stop. Neither the table nor an error depends on where the cuts are, or on the
 //! number of threads.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use memchr::{memchr, memchr_iter, memchr3};
 use rayon::prelude::*;
 
 use super::decimal;
-use super::error::Error;
+use super::error::{Error, quoted};
 use super::layout::{Layout, Row};
 use super::lines::Lines;
 use super::number::Numbers;
 use super::record::Record;
 use super::time::Clock;
+use super::words::{self, States, Tally};
 use super::{Selection, Table};
 
 /// What to read from each row.
@@ -33,6 +36,8 @@ pub(super) struct Plan {
     pub(super) fields: Vec<usize>,
     /// The one of them that is the time.
     pub(super) time: Option<usize>,
+    /// Whether there was a status in place of a number.
+    pub(super) has_statuses: AtomicBool,
 }
 
 /// The rows of a table, by columns.
@@ -118,9 +123,16 @@ struct Read {
 
 impl Plan {
     /// Makes a table of the rows, its columns in the order of the selection.
-    pub(super) fn table(&self, mut rows: Rows, selection: &Selection, start: Option<String>) -> Table {
+    pub(super) fn table(
+        &self,
+        mut rows: Rows,
+        selection: &Selection,
+        start: Option<String>,
+        tallies: &mut [Tally],
+    ) -> Table {
         let place = |field: &usize| self.fields.binary_search(field).unwrap_or_default();
         rows.columns.iter_mut().for_each(|column| column.truncate(rows.count));
+        self.count(&mut rows.columns, tallies);
         let mut take = |field| rows.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
         Table {
             columns: selection.columns.iter().map(&mut take).collect(),
@@ -242,7 +254,11 @@ impl Plan {
 
     /// Whether what is in a field is meant as a number.
     fn has_numbers(&self, index: usize) -> bool {
-        self.time != Some(index) || matches!(self.clock, Clock::Seconds)
+        if self.time == Some(index) {
+            matches!(self.clock, Clock::Seconds)
+        } else {
+            self.layout.states(index).is_none()
+        }
     }
 
     /// The same of any value.
@@ -267,13 +283,66 @@ impl Plan {
         Some((value, field.len() + 1))
     }
 
-    /// Reads the content of a field; an error is a message.
+    /// Reads the content of a field; an error is a message. A status that historians write is a missing value that remembers it.
     fn content(&self, content: &[u8], index: usize) -> Result<f64, String> {
         if self.time == Some(index) {
-            self.clock.read(content, &self.numbers)
-        } else {
-            self.numbers.read(content)
+            return self.clock.read(content, &self.numbers);
         }
+        if let Some(states) = self.layout.states(index) {
+            return self.state(content, states);
+        }
+        let number = self.numbers.read(content);
+        if number.is_err()
+            && let Some(missing) = words::status(content)
+        {
+            self.has_statuses.store(true, Ordering::Relaxed);
+            return Ok(missing);
+        }
+        number
+    }
+
+    /// One of two words as 0 or 1.
+    fn state(&self, content: &[u8], states: States) -> Result<f64, String> {
+        if let Some(value) = states.read(content) {
+            return Ok(value);
+        }
+        if self.numbers.is_missing(content) {
+            return Ok(f64::NAN);
+        }
+        if let Some(missing) = words::status(content) {
+            self.has_statuses.store(true, Ordering::Relaxed);
+            return Ok(missing);
+        }
+        let [off, on] = states.words();
+        Err(format!("{} is neither '{off}' nor '{on}', as the first rows are; correct it", quoted(content)))
+    }
+
+    /// Takes the statuses out of some columns, which are those of the plan, and counts them.
+    pub(super) fn count(&self, columns: &mut [Vec<f64>], tallies: &mut [Tally]) {
+        if self.has_statuses.load(Ordering::Relaxed) {
+            columns.iter_mut().zip(tallies).for_each(|(column, tally)| tally.take(column));
+        }
+    }
+
+    /// What the reader should know of the columns that were read, in plain words.
+    pub(super) fn told(&self) -> impl Iterator<Item = String> {
+        let states =
+            self.fields.iter().filter_map(|&field| Some((field, self.layout.states(field)?.words())));
+        states.map(|(field, [off, on])| {
+            self.layout.told(&format!("{}: '{off}' is read as 0 and '{on}' as 1", self.layout.column(field)))
+        })
+    }
+
+    /// That a field has statuses, in plain words.
+    pub(super) fn has_missing(&self, field: usize, words: &str) -> String {
+        self.layout.told(&format!("{}: read as missing values: {words}", self.layout.column(field)))
+    }
+
+    /// What was counted, in plain words.
+    pub(super) fn counted(&self, tallies: &[Tally]) -> impl Iterator<Item = String> {
+        let told =
+            self.fields.iter().zip(tallies).filter_map(|(&field, tally)| Some((field, tally.words()?)));
+        told.map(|(field, words)| self.has_missing(field, &words))
     }
 
     /// Reads rows by all the rules, and returns the length of their text.
@@ -300,7 +369,8 @@ impl Plan {
     /// Takes the values from a row that was read by all the rules.
     pub(super) fn values(&self, row: &Row<'_>, first: bool, values: &mut [f64]) -> Result<(), Error> {
         let layout = &self.layout;
-        if row.record.len() != layout.width() {
+        let fields = row.record.len();
+        if fields != layout.width() && !(layout.is_open && fields == layout.width() + 1) {
             return Err(layout.ragged(row));
         }
         for (value, &index) in values.iter_mut().zip(&self.fields) {

@@ -12,6 +12,7 @@ use flate2::read::MultiGzDecoder;
 
 use memchr::memchr;
 
+use super::blanks::Separated;
 use super::error::{Error, remedy};
 
 /// The first bytes of every gzip stream.
@@ -208,24 +209,44 @@ impl Source {
         }
     }
 
-    /// Reads no more than it takes to be `enough`, or all there is, and returns the length. It is read again afterwards.
-    pub(super) fn look_ahead(&mut self, most: usize, enough: impl Fn(&[u8]) -> bool) -> Result<usize, Error> {
+    /// Reads no more than it takes to be `enough`, or `most` bytes, or all there is. It is read again afterwards, and so is an error.
+    pub(super) fn look_ahead(&mut self, most: usize, enough: impl Fn(&[u8]) -> bool) -> Vec<u8> {
         let (mut head, mut piece) = (Vec::new(), vec![0; PIECE]);
+        let mut failed = None;
         while !enough(&head) && head.len() < most {
-            match self.read_some(&mut piece)? {
-                0 => break,
-                count => head.extend_from_slice(&piece[..count]),
+            match self.text.read(&mut piece) {
+                Ok(0) => break,
+                Ok(count) => head.extend_from_slice(&piece[..count]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => {
+                    failed = Some(error);
+                    break;
+                }
             }
         }
-        let length = head.len();
         let rest = std::mem::replace(&mut self.text, Box::new(io::empty()));
-        self.text = Box::new(Cursor::new(head).chain(rest));
-        Ok(length)
+        self.text = Box::new(Cursor::new(head.clone()).chain(Failing(failed)).chain(rest));
+        head
+    }
+
+    /// From here on runs of blanks separate fields: the last of each is a tab.
+    pub(super) fn separate_at_blanks(&mut self) {
+        let text = std::mem::replace(&mut self.text, Box::new(io::empty()));
+        self.text = Box::new(Separated::new(text));
     }
 
     /// Says what a failed read means.
     fn failure(&self, error: &io::Error) -> Error {
         failure(&self.name, self.gzip, error)
+    }
+}
+
+/// Nothing, or an error.
+struct Failing(Option<io::Error>);
+
+impl Read for Failing {
+    fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+        self.0.take().map_or(Ok(0), Err)
     }
 }
 

@@ -1,5 +1,6 @@
 //! A text read row by row, as it comes: a file to its end, or a pipe that someone is still writing to.
 
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel};
 use std::thread;
 
@@ -12,6 +13,7 @@ use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::record::Record;
 use super::rows::Plan;
 use super::source::Source;
+use super::words::Tally;
 
 /// What is read at once, at most. A pipe gives less.
 const PIECE: usize = 1 << 16;
@@ -41,6 +43,10 @@ pub(super) struct TextStream {
     /// Whether a last line without a line break is left alone.
     whole_lines: bool,
     start: Option<String>,
+    /// What the reader should know, in plain words, and was not told yet.
+    words: Vec<String>,
+    /// The statuses of which that was said, by field.
+    tallies: Vec<Tally>,
     ended: bool,
     mailbox: Mailbox<Vec<u8>>,
     spent: Sender<Vec<u8>>,
@@ -57,13 +63,15 @@ pub(super) struct Text {
     pub(super) whole_lines: bool,
     /// The time that dates count from, as it is written.
     pub(super) start: Option<String>,
+    /// What the reader should know, in plain words.
+    pub(super) words: Vec<String>,
 }
 
 impl TextStream {
     /// # Errors
     /// That the system has no thread that reads ahead.
     pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Result<Self, Error> {
-        let Text { text, line, source, whole_lines, start } = text;
+        let Text { text, line, source, whole_lines, start, words } = text;
         let mailbox = Mailbox::new();
         let (spent, empty) = channel();
         let pieces = mailbox.sender();
@@ -76,6 +84,8 @@ impl TextStream {
             places: selection.columns.iter().map(place).collect(),
             time: selection.time.as_ref().map(place),
             record: Record::new(plan.layout.dialect.delimiter),
+            words,
+            tallies: vec![Tally::default(); plan.fields.len()],
             plan,
             text,
             position: 0,
@@ -113,6 +123,25 @@ impl TextStream {
     /// The line on which the row at hand is, or the malformed one.
     pub(super) fn line(&self) -> u64 {
         self.line
+    }
+
+    /// What the reader should know, in plain words, each once.
+    pub(super) fn words(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.words)
+    }
+
+    /// Makes missing values of statuses in the row at hand, and says so of each column once.
+    fn tell_statuses(&mut self) {
+        if !self.plan.has_statuses.swap(false, Ordering::Relaxed) {
+            return;
+        }
+        for (place, (value, tally)) in self.fields.iter_mut().zip(&mut self.tallies).enumerate() {
+            let known = tally.words().is_some();
+            tally.take(std::slice::from_mut(value));
+            if let (false, Some(words), Some(&field)) = (known, tally.words(), self.plan.fields.get(place)) {
+                self.words.push(self.plan.has_missing(field, &words));
+            }
+        }
     }
 
     /// Whether the log ended inside a line, which was left alone.
@@ -190,6 +219,7 @@ impl TextStream {
         self.line = self.next_line;
         self.next_line += 1;
         self.any = true;
+        self.tell_statuses();
         for (value, &place) in self.values.iter_mut().zip(&self.places) {
             *value = self.fields[place];
         }
@@ -215,22 +245,4 @@ fn read(mut source: Source, pieces: &SyncSender<Message<Vec<u8>>>, empty: &Recei
             return;
         }
     }
-}
-
-/// Whether a text holds this many whole lines that are neither blank nor comments.
-pub(super) fn has_lines(mut text: &[u8], wanted: usize, comment: Option<u8>) -> bool {
-    // What separates fields does not matter for that.
-    let dialect = super::dialect::Dialect { delimiter: b',', comment };
-    let mut found = 0;
-    while found < wanted {
-        if let Some(length) = dialect.skipped_line(text) {
-            text = &text[length..];
-        } else if let Some(newline) = memchr(b'\n', text) {
-            text = &text[newline + 1..];
-            found += 1;
-        } else {
-            return false;
-        }
-    }
-    true
 }

@@ -13,6 +13,7 @@ use super::source::{Bytes, Source};
 use super::*;
 
 mod random;
+mod shapes;
 mod stream;
 
 /// Blocks and pieces so small that rows, fields and numbers are cut everywhere.
@@ -83,7 +84,7 @@ fn names_are_given_as_they_are() {
         |text: &str, options: &Options| start(text.as_bytes(), options, SIZES).unwrap().names().to_vec();
     assert_eq!(names("u, y ,,u\n1,2,3,4\n", &plain()), ["u", "y", "", "u"]);
     assert_eq!(names("\"a,\nb\";\"say \"\"µ\"\"\"\n1;2\n", &plain()), ["a,\nb", "say \"µ\""]);
-    assert_eq!(names("5,6,7\n", &Options { header: false, ..plain() }), ["1", "2", "3"]);
+    assert_eq!(names("5,6,7\n", &Options { header: Header::None, ..plain() }), ["1", "2", "3"]);
 }
 
 #[test]
@@ -153,7 +154,7 @@ fn one_column_needs_no_delimiter() {
     let table = table("y\n1\n\"\"\n2\n", &plain());
     assert_eq!(table.rows, 3);
     assert!(table.columns[0][1].is_nan());
-    assert_eq!(columns("7\n", &Options { header: false, ..plain() }), [[7.0]]);
+    assert_eq!(columns("7\n", &Options { header: Header::None, ..plain() }), [[7.0]]);
 }
 
 #[test]
@@ -171,7 +172,7 @@ fn comments_and_units_are_left_out() {
     let table = table("# it's a \"log\nu,y\n# units\nV,°C\n1,2\n # a,b,c\n\n3,4\n", &options);
     assert_eq!(table.columns, [[1.0, 3.0], [2.0, 4.0]]);
     assert_eq!((table.lines.of(0), table.lines.of(1)), (5, 8));
-    let options = Options { header: false, skip_rows: 2, ..plain() };
+    let options = Options { header: Header::None, skip_rows: 2, ..plain() };
     assert_eq!(columns("made by,x\n\nV,°C\n1,2\n3,4\n", &options), [[1.0, 3.0], [2.0, 4.0]]);
 }
 
@@ -195,23 +196,25 @@ fn quoted_line_breaks_in_the_header_count() {
 
 #[test]
 fn decimal_commas() {
-    let options = Options { decimal_comma: true, ..plain() };
+    let options = Options { decimal_comma: Some(true), ..plain() };
     assert_eq!(columns("u;y\n1,5;-2\n,5;1,e2\n", &options), [[1.5, 0.5], [-2.0, 100.0]]);
     assert_eq!(columns("y\n1,5\n2,5\n", &options), [[1.5, 2.5]]);
     assert_eq!(columns("u\ty\n1,5\t\"2,5\"\n", &options), [[1.5], [2.5]]);
     assert_eq!(
         error("u;y\n1.5;2\n", &options),
-        "log.csv:2:1: column 'u': \"1.5\" has a decimal point, yet `decimal-comma` was given; correct it, or leave that \
-         option out"
+        "log.csv:2:1: column 'u': \"1.5\" has a decimal point where others have a comma; correct it, or say \
+         `decimal-comma`=no"
     );
+    // They are recognised.
+    assert_eq!(columns("u;y\n1;2,5\n", &plain()), [[1.0], [2.5]]);
+    assert_eq!(columns("y\n1,5\n2,5\n", &plain()), [[1.5, 2.5]]);
     assert_eq!(
-        error("u;y\n1;2,5\n", &plain()),
+        error("u;y\n1;2,5\n", &Options { decimal_comma: Some(false), ..plain() }),
         "log.csv:2:3: column 'y': \"2,5\" is not a number; if it has a decimal comma, say `decimal-comma`"
     );
     assert_eq!(
-        error("y\n1,5\n2,5\n", &plain()),
-        "log.csv:2:3: this row has 2 fields, but there is 1 column (\",\" separates them); if it has a decimal comma, \
-         say `decimal-comma`"
+        error("u;y\n1,5;2,5\n1;1.55\n", &plain()),
+        "log.csv:2:1: column 'u': \"1,5\" is not a number; if it has a decimal comma, say `decimal-comma`"
     );
     assert_eq!(
         error("u,y\n1,5,2,5\n1,5,2,5\n", &plain()),
@@ -239,7 +242,7 @@ fn values_that_are_no_numbers() {
              for a missing value",
         ),
         (
-            "u,y\nV,°C\n1,2\n",
+            "u,y\nV,5\n1,2\n",
             "log.csv:2:1: column 'u': \"V\" is not a number; correct it, or name it with `missing` V if it stands for \
              a missing value; if this row holds units, leave it out with `skip-rows`",
         ),
@@ -255,8 +258,7 @@ fn values_that_are_no_numbers() {
         ),
         (
             "u,y\n1 2,3\n",
-            "log.csv:2:1: column 'u': \"1 2\" is not one number; say `delimiter` ' ' if one blank separates two \
-             fields, and put one in place of several",
+            "log.csv:2:1: column 'u': \"1 2\" is not one number; say `delimiter` ' ' if blanks separate fields",
         ),
     ] {
         assert_eq!(error(text, &plain()), message, "{text:?}");
@@ -286,7 +288,7 @@ fn ragged_rows() {
              or quote the one that holds a delimiter",
         ),
         (
-            "a\tb\n1\t2\t\n",
+            "a\tb\n1\t2\t\n3\t4\t5\n",
             "log.csv:2:5: this row has 3 fields, but there are 2 columns (\"\\t\" separates them); take the delimiter \
              at its end away, or name one column more",
         ),
@@ -297,8 +299,8 @@ fn ragged_rows() {
              if only the delimiters",
         ),
         (
-            "# by x\na,b,c\n1,2,3\n",
-            "log.csv:2:3: this row has 3 fields, but there is 1 column (\",\" separates them); if the first line is a \
+            "a,b,c\n1,2,3\n# paused\n4,5,6\n",
+            "log.csv:3:9: this row has 1 field, but there are 3 columns (\",\" separates them); if this line is a \
              comment, say `comment` and its first character",
         ),
     ] {
@@ -306,7 +308,7 @@ fn ragged_rows() {
     }
     // Without a header the first row counts.
     assert!(
-        error("1,2\n1,2,3\n", &Options { header: false, ..plain() })
+        error("1,2\n1,2,3\n", &Options { header: Header::None, ..plain() })
             .starts_with("log.csv:2:5: this row has 3")
     );
 }
@@ -339,8 +341,11 @@ fn what_is_no_text_table() {
     // A NUL byte that turns up after the first block.
     let text = format!("y\n{}1\0\n", "1\n".repeat(100));
     let error = read_all(text.as_bytes(), &plain(), false, sizes(10, 5)).unwrap_err().to_string();
+    assert!(error.starts_with("log.csv:102:2: a NUL byte: this is no text table"), "{error}");
+    let text = format!("y\n{}1\0\n", "1\n".repeat(200_000));
+    let error = read_all(text.as_bytes(), &plain(), false, SIZES).unwrap_err().to_string();
     assert!(
-        error.starts_with("log.csv:102:1: column 'y': \"1\\0\" is not a number; there is a NUL byte"),
+        error.starts_with("log.csv:200002:1: column 'y': \"1\\0\" is not a number; there is a NUL byte"),
         "{error}"
     );
     // No newline for too long, in the header and later.
@@ -469,7 +474,7 @@ fn times() {
         "log.csv:3:1: column 't': \"2024-03-01\" is a date, but the first time is a number; write all times alike"
     );
     assert!(error("t,y\n2024-03-01,1\n5,2\n").starts_with("log.csv:3:1: column 't': \"5\" is not a date"));
-    assert!(error("t,y\ns,V\n1,2\n").ends_with("if this row holds units, leave it out with `skip-rows`"));
+    assert!(error("t,y\nx,5\n1,2\n").ends_with("if this row holds units, leave it out with `skip-rows`"));
     assert!(error("t,y\n12:00,1\n").contains("`time-format`"));
     assert!(error("t,y\n,1\n").contains("the time is missing"));
     // A ragged first row is that in the first place.
@@ -488,14 +493,15 @@ fn options_are_checked() {
     assert!(error(Options { comment: Some(b' '), ..plain() }).contains("cannot start a comment"));
     assert!(error(Options { comment: Some(b';'), delimiter: Some(b';'), ..plain() }).contains("both"));
     assert!(
-        error(Options { delimiter: Some(b','), decimal_comma: true, ..plain() }).contains("decimal comma")
+        error(Options { delimiter: Some(b','), decimal_comma: Some(true), ..plain() })
+            .contains("decimal comma")
     );
     assert_eq!(plain().check(), Ok(()));
     let options = Options { delimiter: Some(b'.'), ..plain() };
     let error = Reader::open("log.csv".as_ref(), &options).map(drop).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "log.csv: \".\" cannot be the delimiter; use a comma, a semicolon or a tab"
+        "log.csv: \".\" cannot be the delimiter; use a comma, a semicolon, a tab or a space"
     );
 }
 

@@ -291,10 +291,11 @@ def inspect(
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
-    decimal_comma: bool = False,
-    header: bool = True,
+    decimal_comma: bool | None = None,
+    header: bool | int = True,
     skip_rows: int | None = None,
     missing: str | Sequence[str] | None = None,
+    values: Mapping[str, float] | None = None,
 ) -> Inspection:
     """Inspect a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
 
@@ -304,7 +305,7 @@ def inspect(
         The data, or a CSV file, whose clock may be irregular.
     inputs, output
         The columns of a file that are inputs and output; without names all columns of numbers are inspected.
-    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
+    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
         How a file is read, see `thetahat.ReadOptions`.
 
     Returns

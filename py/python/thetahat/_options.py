@@ -377,13 +377,16 @@ class ReadOptions(TypedDict, total=False):
     delimiter, comment, encoding : str
         The character between fields; the one that begins a comment; the file's encoding.
     decimal_comma : bool
-        Whether numbers are written with a decimal comma.
-    header : bool
-        Whether the first row holds the names of the columns.
+        Whether numbers are written with a decimal comma. Without it the first rows say.
+    header : bool or int
+        The line that holds the names of the columns, counted from 1, or False if there is none. Without it that is the last line of
+        words above the rows.
     skip_rows : int
-        Lines to leave out before it.
+        Lines to leave out below it; a line of units is recognised.
     missing : list of str
-        What stands for a missing value, besides nothing and NaN.
+        What stands for a missing value, besides nothing, NaN and what historians and spreadsheets write.
+    values : dict of str to float
+        Words that stand for numbers, such as {"auto": 1}, besides words for off and on.
     """
 
     time: str
@@ -394,9 +397,10 @@ class ReadOptions(TypedDict, total=False):
     comment: str
     encoding: str
     decimal_comma: bool
-    header: bool
+    header: Union[bool, int]
     skip_rows: int
     missing: Union[str, Sequence[str]]
+    values: Mapping[str, float]
 
 
 def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
@@ -417,7 +421,12 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             continue
         if name == "header":
             # The command line says it the other way round.
-            found += [] if flag(name, value) else ["--no-header"]
+            if isinstance(value, (bool, np.bool_)):
+                found += [] if value else ["--no-header"]
+            else:
+                found.append(f"--header-row={integer(name, value)}")
+        elif name == "decimal_comma":
+            found.append(f"--decimal-comma={'yes' if flag(name, value) else 'no'}")
         elif name == "linear":
             found += [] if flag(name, value) else ["--no-linear"]
         elif name == "terms" and isinstance(value, (list, tuple)):
@@ -429,7 +438,9 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
             if not isinstance(value, (list, tuple)):
                 raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
             found += [f"--regressor={text(name, one)}" for one in value]
-        elif name in ("decimal_comma", "trend", "raw_terms", "drawn"):
+        elif name == "values":
+            found += [f"--value={one}" for one in _texts(name, value, rows)]
+        elif name in ("trend", "raw_terms", "drawn"):
             found += [f"--{name.replace('_', '-')}"] if flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
@@ -604,6 +615,10 @@ _WHOLE = frozenset(
 def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name in ("estimate", "validate", "rows"):
         return [",".join(_rows(name, value, rows))]
+    if name == "values":
+        if not isinstance(value, Mapping):
+            raise TypeError(f"{name}: expected a dict, found {value!r}")
+        return [f"{text(name, word)}={number(name, of)}" for word, of in value.items()]
     if name in ("offset", "bound"):
         if not isinstance(value, Mapping):
             raise TypeError(f"{name}: expected a dict, found {value!r}")

@@ -28,10 +28,11 @@ def read_csv(
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
-    decimal_comma: bool = False,
-    header: bool = True,
+    decimal_comma: bool | None = None,
+    header: bool | int = True,
     skip_rows: int | None = None,
     missing: str | Sequence[str] | None = None,
+    values: Mapping[str, float] | None = None,
 ) -> Log:
     """Read a log from a CSV file, as the command line does.
 
@@ -45,7 +46,7 @@ def read_csv(
         The column that is the output, or those that are: y, unless said otherwise.
     uniform : bool, default True
         Whether the steps of the clock have to be even. Models in equations take any.
-    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing
+    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
         How the file is read, see `thetahat.ReadOptions`.
 
     Returns

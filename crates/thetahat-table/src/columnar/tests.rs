@@ -15,7 +15,7 @@ use parquet::file::properties::WriterProperties;
 use tempfile::TempDir;
 
 use crate::memory::Bound;
-use crate::{Error, ErrorKind, Event, Options, Reader, Selection, Table};
+use crate::{Error, ErrorKind, Event, Header, Options, Reader, Selection, Table};
 
 /// The formats by the ending of a file's name.
 const FORMATS: [&str; 3] = ["parquet", "arrow", "arrows"];
@@ -394,8 +394,8 @@ fn options_of_texts_are_refused() {
     let bytes = bytes("parquet", &[table]);
     for (options, option) in [
         (Options { delimiter: Some(b';'), ..Options::default() }, "`delimiter`"),
-        (Options { decimal_comma: true, ..Options::default() }, "`decimal-comma`"),
-        (Options { header: false, ..Options::default() }, "`no-header`"),
+        (Options { decimal_comma: Some(true), ..Options::default() }, "`decimal-comma`"),
+        (Options { header: Header::None, ..Options::default() }, "`no-header`"),
         (Options { skip_rows: 1, ..Options::default() }, "`skip-rows`"),
         (Options { comment: Some(b'#'), ..Options::default() }, "`comment`"),
         (Options { missing: vec!["-9".to_owned()], ..Options::default() }, "`missing`"),

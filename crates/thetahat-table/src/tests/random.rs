@@ -149,7 +149,11 @@ fn no_bytes_make_it_panic_and_no_cut_makes_a_difference() {
         for _ in 0..dice.below(40) {
             bytes.extend_from_slice(dice.pick(&words));
         }
-        let options = Options { header: dice.below(2) == 0, skip_rows: dice.below(2), ..comma() };
+        let options = Options {
+            header: dice.pick(&[Header::Recognised, Header::None, Header::Line(2)]),
+            skip_rows: dice.below(2),
+            ..comma()
+        };
         let time = dice.below(2) == 0;
         let outcome = |sizes| match read_all(&bytes, &options, time, sizes) {
             Ok(table) => Ok(contents(&table)),
@@ -190,7 +194,8 @@ fn no_stream_makes_it_panic() {
         }
         let encoding =
             dice.pick(&[None, None, Some(UTF_16LE), Some(WINDOWS_1252), Some(encoding_rs::SHIFT_JIS)]);
-        let options = Options { encoding, decimal_comma: dice.below(2) == 0, ..plain() };
+        let options =
+            Options { encoding, decimal_comma: dice.pick(&[None, Some(false), Some(true)]), ..plain() };
         let block = dice.pick(&[1, 2, 3, 5, 100]);
         let _ = read_all(&bytes, &options, false, sizes(block, 3));
     }

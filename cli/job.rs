@@ -23,7 +23,7 @@ use std::str::FromStr;
 use thetahat::data::{Interpolation, Resample, Rows};
 use thetahat::respond::InitialCondition;
 use thetahat::thetahat_core::nalgebra::Complex;
-use thetahat_table::Header;
+use thetahat_table::{Header, Unit};
 
 use crate::args::{
     ClockArguments, LineArguments, LineFormatArgument, LiveClockArguments, LogArguments, StartArgument,
@@ -64,8 +64,8 @@ pub(crate) enum Clock {
     Column { name: String, resample: Option<Resample> },
     /// A fixed sample time in seconds.
     Fixed(f64),
-    /// Not given.
-    Unknown,
+    /// Not given: that of the log, if it has one.
+    Unknown { resample: Option<Resample> },
 }
 
 /// The one log of a verb that takes each by itself.
@@ -84,7 +84,15 @@ impl Clock {
     pub(crate) fn column(&self) -> Option<String> {
         match self {
             Self::Column { name, .. } => Some(name.clone()),
-            Self::Fixed(_) | Self::Unknown => None,
+            Self::Fixed(_) | Self::Unknown { .. } => None,
+        }
+    }
+
+    /// How to put the log on another clock.
+    pub(crate) fn resample(&self) -> Option<Resample> {
+        match self {
+            Self::Column { resample, .. } | Self::Unknown { resample } => *resample,
+            Self::Fixed(_) => None,
         }
     }
 }
@@ -112,29 +120,24 @@ impl LogJob {
             values: log.value.iter().map(|text| value(text)).collect::<Result<_, _>>()?,
             encoding: encoding.transpose()?,
             time_format: clock.time_format.clone(),
+            time_unit: clock.time_unit.as_deref().map(unit).transpose()?,
             bound: None,
         };
         options.check().map_err(Failure::usage)?;
-        for (option, given) in
-            [("--time-format", clock.time_format.is_some()), ("--resample", clock.resample.is_some())]
-        {
-            if given && clock.time.is_none() {
-                return Err(Failure::usage(format!(
-                    "{option} needs the column of times: give --time; without one, rows are evenly apart"
-                )));
-            }
+        if clock.resample.is_some() && clock.sample_time.is_some() {
+            return Err(Failure::usage(
+                "--resample needs the column of times: give --time in place of --sample-time; without one, rows are evenly apart",
+            ));
         }
         let seconds = |argument, value| positive(argument, value, "number of seconds");
+        let resample = clock.resample.as_deref().map(resampling).transpose()?;
+        if let Some(how) = &resample {
+            seconds("--resample", how.step)?;
+        }
         let clock = match (&clock.time, clock.sample_time) {
-            (Some(name), _) => {
-                let resample = clock.resample.as_deref().map(resampling).transpose()?;
-                if let Some(how) = &resample {
-                    seconds("--resample", how.step)?;
-                }
-                Clock::Column { name: name.clone(), resample }
-            }
+            (Some(name), _) => Clock::Column { name: name.clone(), resample },
             (None, Some(step)) => Clock::Fixed(seconds("--sample-time", step)?),
-            (None, None) => Clock::Unknown,
+            (None, None) => Clock::Unknown { resample },
         };
         Ok(Self { options, clock, per_value: PerValue::Plain, quiet: false })
     }
@@ -148,6 +151,7 @@ impl LogJob {
         let whole = ClockArguments {
             time: clock.time.clone(),
             time_format: clock.time_format.clone(),
+            time_unit: clock.time_unit.clone(),
             sample_time: sample_time.filter(|_| clock.time.is_none()),
             resample: None,
         };
@@ -250,6 +254,13 @@ fn value(text: &str) -> Result<(String, f64), Failure> {
         Some((word, number)) if !word.is_empty() && f64::is_finite(number) => Ok((word.to_owned(), number)),
         _ => Err(Failure::usage(format!("--value {text}: write it as WORD=NUMBER, such as auto=1"))),
     }
+}
+
+/// A unit of times.
+fn unit(text: &str) -> Result<Unit, Failure> {
+    Unit::of(text).ok_or_else(|| {
+        Failure::usage(format!("--time-unit {text}: no such unit; give one of ns, us, ms, s, min, h and d"))
+    })
 }
 
 /// One ASCII character, or a name for it.

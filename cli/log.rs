@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use thetahat::data::{Channel, Log, Recording, Resampling, Rows, Source, Times};
 use thetahat::model::{GreyBox, Model};
 use thetahat::{Error, text};
-use thetahat_table::{Bound, Lines, Options, Reader, Selection, Stream, Table};
+use thetahat_table::{Bound, ClockColumns, Lines, Options, Reader, Selection, Stream, Table};
 
 use crate::failure::Failure;
 use crate::interrupt;
+use crate::messages::note;
 use crate::job::{Clock, LogJob};
 use crate::progress::Reading;
 
@@ -104,14 +105,15 @@ pub(crate) fn load(
     clocks: Clocks,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
-    let Columns { channels, table, mut source, words } = columns(path, job, |reader| choose(reader.names()))?;
+    let Columns { channels, table, mut source, clock, words } =
+        columns(path, job, |reader| choose(reader.names()))?;
     let file = source.file.clone();
-    let log = match (&job.clock, table.time) {
+    let log = match (&clock, table.time) {
         (Clock::Column { resample: Some(how), .. }, Some(time)) => {
             source.resampled = Some(Resampling::new(how, &time).map_err(at_line(&file, &table.lines))?);
             Log::resampled(channels, &time, how)
         }
-        (_, time) => made(channels, time, job, clocks),
+        (_, time) => made(channels, time, &clock, clocks),
     };
     let log = log.map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
@@ -191,9 +193,9 @@ pub(crate) fn in_parts<T>(
     let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let (names, lags, chosen) = choose(&reader)?;
-    let (selection, mut words) = selected(&reader, &file, job, &names)?;
+    let Selected { selection, clock, mut words } = selected(&reader, &file, job, &names)?;
     let most = (PART / (names.len() + 1)).max(2 * lags);
-    let mut before = Before { file: &file, names: &names, job, lags, rows: 0, tail: Tail::default() };
+    let mut before = Before { file: &file, names: &names, clock, lags, rows: 0, tail: Tail::default() };
     let mut waiting: Option<Table> = None;
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
@@ -241,7 +243,7 @@ struct Tail {
 struct Before<'l> {
     file: &'l str,
     names: &'l [String],
-    job: &'l LogJob,
+    clock: Clock,
     lags: usize,
     /// How many rows there were.
     rows: usize,
@@ -268,12 +270,12 @@ impl<'l> Before<'l> {
         self.tail = Tail { columns: columns.iter().map(last).collect(), time: time.as_ref().map(last) };
         let channels = self.names.iter().cloned().zip(columns);
         let channels = channels.map(|(name, values)| Channel { name, values }).collect();
-        let recording = Recording { channels, times: times(self.job, time) };
+        let recording = Recording { channels, times: times(&self.clock, time) };
         let (first, end) = (self.rows + 1, self.rows + rows);
         let source = Source {
             file: format!("{file} (rows {first}..{end})"),
             rows: Rows::new(1, past + rows).map_err(|error| Failure::data(format!("{file}: {error}")))?,
-            time: self.job.clock.column(),
+            time: self.clock.column(),
             start,
             resampled: None,
         };
@@ -283,8 +285,8 @@ impl<'l> Before<'l> {
 }
 
 /// A log of channels, with the clock of the job.
-fn made(channels: Vec<Channel>, time: Option<Vec<f64>>, job: &LogJob, clocks: Clocks) -> Result<Log, Error> {
-    match (&job.clock, time) {
+fn made(channels: Vec<Channel>, time: Option<Vec<f64>>, clock: &Clock, clocks: Clocks) -> Result<Log, Error> {
+    match (clock, time) {
         (_, Some(time)) if clocks.any => Log::recorded(channels, time),
         (_, Some(time)) => Log::with_time(channels, time),
         (Clock::Fixed(seconds), None) => Log::new(channels, *seconds),
@@ -309,14 +311,14 @@ pub(crate) fn record(
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Recorded, Failure> {
-    let Columns { channels, table, source, words } = columns(path, job, choose)?;
-    let times = times(job, table.time);
+    let Columns { channels, table, source, clock, words } = columns(path, job, choose)?;
+    let times = times(&clock, table.time);
     Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
 }
 
 /// When the rows were recorded: one a second without a clock.
-fn times(job: &LogJob, time: Option<Vec<f64>>) -> Times {
-    match (&job.clock, time) {
+fn times(clock: &Clock, time: Option<Vec<f64>>) -> Times {
+    match (clock, time) {
         (_, Some(time)) => Times::Measured(time),
         (Clock::Fixed(seconds), None) => Times::Uniform(*seconds),
         (_, None) => Times::Uniform(1.0),
@@ -334,7 +336,21 @@ pub(crate) fn follow(
 ) -> Result<(Stream, Vec<String>), Failure> {
     let reader = Reader::open_live(path, &options(job))?;
     let names = choose(reader.names())?;
-    let (selection, words) = selected(&reader, &path.display().to_string(), job, &names)?;
+    let file = path.display().to_string();
+    // A clock that is not named is not taken: of a log that is still being written there may be one row.
+    let mut hint = None;
+    let live = match &job.clock {
+        Clock::Unknown { .. } => {
+            let columns = find_all(&names, reader.names()).unwrap_or_default();
+            hint = free_clocks(&reader, &columns).first().map(|clock| called(*clock, reader.names()));
+            &LogJob { clock: Clock::Fixed(1.0), options: job.options.clone(), ..*job }
+        }
+        _ => job,
+    };
+    let Selected { selection, mut words, .. } = selected(&reader, &file, live, &names)?;
+    words.extend(hint.map(|name| {
+        format!("{file}: column '{name}' looks like a clock; --time {name} would use it")
+    }));
     let stream = reader.stream(&selection, whole_lines, start)?;
     interrupt::follows(stream.waker());
     Ok((stream, words))
@@ -357,6 +373,7 @@ struct Columns {
     table: Table,
     /// Where they came from, the rows as they stand there.
     source: Source,
+    clock: Clock,
     /// What the reader should know, in plain words.
     words: Vec<String>,
 }
@@ -369,7 +386,7 @@ fn columns(
     let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
-    let (selection, mut words) = selected(&reader, &file, job, &names)?;
+    let Selected { selection, clock, mut words } = selected(&reader, &file, job, &names)?;
 
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
@@ -380,8 +397,8 @@ fn columns(
     let values = std::mem::take(&mut table.columns);
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
-    let source = Source { file, rows, time: job.clock.column(), start: table.start.take(), resampled: None };
-    Ok(Columns { channels, table, source, words })
+    let source = Source { file, rows, time: clock.column(), start: table.start.take(), resampled: None };
+    Ok(Columns { channels, table, source, clock, words })
 }
 
 /// How a log is written, and as much memory as there is now: other logs may be in memory already.
@@ -389,29 +406,49 @@ fn options(job: &LogJob) -> Options {
     Options { bound: Some(Bound::now(job.per_value as u64)), ..job.options.clone() }
 }
 
-/// Where the named columns are, and the clock of the job; with what the reader should know, in plain words.
-fn selected(
-    reader: &Reader,
-    file: &str,
-    job: &LogJob,
-    names: &[String],
-) -> Result<(Selection, Vec<String>), Failure> {
+/// The columns that are read.
+struct Selected {
+    selection: Selection,
+    /// Where the times come from: not left to the log any more, unless it has no clock.
+    clock: Clock,
+    /// What the reader should know, in plain words.
+    words: Vec<String>,
+}
+
+/// Where the named columns are, and the clock: that of the job, or the one column of the log that is a clock and not among those.
+fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Result<Selected, Failure> {
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();
-    let mut words = Vec::new();
-    let time = match &job.clock {
-        Clock::Column { name, .. } => Some(find(name, header).map_err(bad)?),
-        Clock::Fixed(_) => None,
-        Clock::Unknown => {
-            let called = || header.iter().find(|name| ["t", "time"].contains(&name.to_lowercase().as_str()));
-            if let Some(name) = reader.times().first().and_then(|&time| header.get(time)).or_else(called) {
-                words.push(format!("{file}: column '{name}' looks like a clock; --time {name} would use it"));
-            }
-            None
-        }
-    };
     let columns = find_all(names, header).map_err(bad)?;
-    let mut taken: HashSet<usize> = time.into_iter().collect();
+    let (clock, found) = match &job.clock {
+        Clock::Unknown { resample } => {
+            let found = free_clocks(reader, &columns);
+            let found = match found.as_slice() {
+                [] => None,
+                [one] => Some(*one),
+                several => return Err(bad(several_clocks(several, header))),
+            };
+            let clock = match (found, resample) {
+                (Some(found), resample) => {
+                    let name = called(found, header);
+                    if !job.quiet {
+                        note(&format!(
+                            "{file}: the clock is column '{name}'; --time names another, --sample-time counts rows"
+                        ));
+                    }
+                    Clock::Column { name, resample: *resample }
+                }
+                (None, Some(_)) => {
+                    return Err(bad("no column is a clock, and --resample needs one; name it with --time".to_owned()));
+                }
+                (None, None) => job.clock.clone(),
+            };
+            (clock, found)
+        }
+        Clock::Column { name, .. } => (job.clock.clone(), Some(named_clock(name, header).map_err(bad)?)),
+        Clock::Fixed(_) => (job.clock.clone(), None),
+    };
+    let mut taken: HashSet<usize> = found.iter().flat_map(|found| [Some(found.time), found.date]).flatten().collect();
     for &column in &columns {
         if !taken.insert(column) {
             return Err(Failure::usage(format!(
@@ -420,7 +457,49 @@ fn selected(
             )));
         }
     }
-    Ok((Selection { columns, time }, words))
+    let (time, date) = found.map_or((None, None), |found| (Some(found.time), found.date));
+    Ok(Selected { selection: Selection { columns, time, date }, clock, words: Vec::new() })
+}
+
+/// The columns that are the clock of a log, or may be it.
+pub(crate) fn clocks(reader: &Reader, job: &LogJob) -> Vec<usize> {
+    let found = match &job.clock {
+        Clock::Unknown { .. } => reader.times(),
+        Clock::Column { name, .. } => named_clock(name, reader.names()).into_iter().collect(),
+        Clock::Fixed(_) => Vec::new(),
+    };
+    found.iter().flat_map(|found| [Some(found.time), found.date]).flatten().collect()
+}
+
+/// The clocks of a log of which no column has another role.
+fn free_clocks(reader: &Reader, columns: &[usize]) -> Vec<ClockColumns> {
+    let is_free = |column: usize| !columns.contains(&column);
+    reader.times().into_iter().filter(|found| is_free(found.time) && found.date.is_none_or(is_free)).collect()
+}
+
+/// The columns of a clock: the one of this name, or two with a comma between their names, of dates and of times of day.
+fn named_clock(name: &str, header: &[String]) -> Result<ClockColumns, String> {
+    let pair = thetahat_table::names(name).ok().filter(|pair| pair.len() == 2 && !header.iter().any(|own| own == name));
+    match pair.as_deref() {
+        Some([date, time]) => Ok(ClockColumns { time: find(time, header)?, date: Some(find(date, header)?) }),
+        _ => Ok(ClockColumns { time: find(name, header)?, date: None }),
+    }
+}
+
+/// A clock as `--time` names it.
+fn called(clock: ClockColumns, header: &[String]) -> String {
+    match clock.date {
+        Some(date) => thetahat_table::list(&[&header[date], &header[clock.time]]),
+        None => header[clock.time].clone(),
+    }
+}
+
+fn several_clocks(clocks: &[ClockColumns], header: &[String]) -> String {
+    let names: Vec<String> = clocks.iter().map(|clock| format!("'{}'", called(*clock, header))).collect();
+    format!(
+        "several columns may be the clock: {}; name one with --time, or give --sample-time to count rows",
+        names.join(", ")
+    )
 }
 
 /// The one column of each name.

@@ -12,6 +12,11 @@ pub(crate) fn warn(warning: &str) {
     tell(&format!("\x1b[1;33mwarning:\x1b[0m {}", message(&with_options(warning))));
 }
 
+/// Says something that the reader may want to know.
+pub(crate) fn note(words: &str) {
+    tell(&format!("\x1b[1mnote:\x1b[0m {}", message(words)));
+}
+
 /// Says something that may be long: on a terminal it is broken between words.
 pub(crate) fn tell(line: &str) {
     match wrap::stderr_width() {

@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 92] = [
+pub(crate) const OPTIONS: [&str; 94] = [
     "alarm",
     "alpha",
     "alphas",
@@ -85,6 +85,8 @@ pub(crate) const OPTIONS: [&str; 92] = [
     "time",
     "time-format",
     "time-limit",
+    "time-unit",
+    "time-zone",
     "to",
     "tolerance",
     "trend",

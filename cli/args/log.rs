@@ -14,6 +14,9 @@ pub(crate) struct LiveClockArguments {
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
     #[arg(long, value_name = "FORMAT", requires = "time")]
     pub(crate) time_format: Option<String>,
+    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times, else s]
+    #[arg(long, value_name = "UNIT", requires = "time")]
+    pub(crate) time_unit: Option<String>,
     /// Seconds from one row to the next [default: that of the model; for track with --time, the first step]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) sample_time: Option<f64>,
@@ -89,13 +92,17 @@ pub(crate) struct LogArguments {
 /// The log's clock.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ClockArguments {
-    /// The column of times: seconds, ISO 8601 dates, or the timestamps and durations of a Parquet or Arrow file
+    /// The column of times: numbers, dates, or the timestamps and durations of a Parquet or Arrow file; two columns, of dates and of
+    /// times of day, as DATE,TIME [default: the one column that is a clock by its name and its values]
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time: Option<String>,
-    /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
-    #[arg(long, value_name = "FORMAT", help_heading = "Clock")]
+    /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S [default: recognised]
+    #[arg(long, value_name = "FORMAT", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_format: Option<String>,
-    /// Seconds from one row to the next [default: 1, so that times count rows]
+    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times, else s]
+    #[arg(long, value_name = "UNIT", conflicts_with = "sample_time", help_heading = "Clock")]
+    pub(crate) time_unit: Option<String>,
+    /// Seconds from one row to the next [default: by the clock; without one 1, so that times count rows]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
     /// Put a log on another clock: a step in seconds, and how values between samples are read. A step of two recorded ones or

@@ -14,7 +14,7 @@ use super::experiments::usual_inputs;
 use super::summary;
 use crate::args::{EachArguments, FormatArgument, InspectArguments};
 use crate::failure::Failure;
-use crate::job::{Clock, InspectJob};
+use crate::job::InspectJob;
 use crate::log::{self, Recorded};
 use crate::output;
 use crate::wrap::{WIDTH, stdout_width};
@@ -164,10 +164,7 @@ impl Chosen {
     }
 
     fn plan(&self, job: &InspectJob) -> InspectionPlan {
-        let resample = match &job.log.clock {
-            Clock::Column { resample, .. } => *resample,
-            Clock::Fixed(_) | Clock::Unknown => None,
-        };
+        let resample = job.log.clock.resample();
         InspectionPlan { inputs: self.inputs.clone(), output: self.output.clone(), resample }
     }
 
@@ -179,7 +176,7 @@ impl Chosen {
             "it holds no numbers",
         ];
         let names = reader.names();
-        let is_time = |name: &str| matches!(&job.log.clock, Clock::Column { name: time, .. } if time == name);
+        let clocks = log::clocks(reader, &job.log);
         let nameless: HashSet<usize> = reader.nameless().into_iter().collect();
         let mut count: HashMap<&str, usize> = HashMap::with_capacity(names.len());
         names.iter().for_each(|name| *count.entry(name).or_default() += 1);
@@ -187,7 +184,7 @@ impl Chosen {
         let mut left_out = [const { Vec::new() }; REASONS.len()];
         for ((column, name), holds_words) in names.iter().enumerate().zip(reader.words()) {
             let reason = match (nameless.contains(&column), count[name.as_str()]) {
-                _ if is_time(name) => continue,
+                _ if clocks.contains(&column) => continue,
                 (true, _) => 0,
                 // A name that stands twice cannot be read at all.
                 (_, 2..) => 1,

@@ -52,8 +52,9 @@ impl InspectJob {
         let path = if path.starts_with('-') && path != "-" { format!("./{path}") } else { path.to_owned() };
         let mut words = vec!["thetahat".to_owned(), "fit".to_owned(), quoted(&path)];
         let mut option = |name: &str, value: &str| words.push(assigned(name, value));
-        match &self.log.clock {
-            Clock::Column { name, .. } => {
+        match (&self.log.clock, &inspection.log.time) {
+            (Clock::Fixed(seconds), _) => option("--sample-time", &seconds.to_string()),
+            (_, Some(name)) => {
                 option("--time", name);
                 let clock = &inspection.clock;
                 match (&arguments.clock.resample, &inspection.log.resampled) {
@@ -63,11 +64,13 @@ impl InspectJob {
                     (None, None) => {}
                 }
             }
-            Clock::Fixed(seconds) => option("--sample-time", &seconds.to_string()),
-            Clock::Unknown => {}
+            (_, None) => {}
         }
         if let Some(format) = &arguments.clock.time_format {
             option("--time-format", format);
+        }
+        if let Some(unit) = &arguments.clock.time_unit {
+            option("--time-unit", unit);
         }
         let idle = |name: &str| {
             let mut excitations = inspection.excitation.iter();

@@ -53,6 +53,7 @@ impl StepArguments {
             ("output", self.output.is_some()),
             ("time", clock.time.is_some()),
             ("time-format", clock.time_format.is_some()),
+            ("time-unit", clock.time_unit.is_some()),
             ("sample-time", clock.sample_time.is_some()),
             ("resample", clock.resample.is_some()),
             ("delimiter", log.delimiter.is_some()),

@@ -123,6 +123,12 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
+/// A number with a few digits, as a message has it.
+pub(super) fn figure(value: f64) -> String {
+    let short: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    if (1e-4..1e7).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
+}
+
 /// A piece of the log as a message repeats it: in quotes, shortened, and harmless to a terminal.
 pub(super) fn quoted(text: &[u8]) -> String {
     match std::str::from_utf8(text) {

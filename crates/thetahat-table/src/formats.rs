@@ -8,7 +8,7 @@ use super::mailbox::{Event, Waker};
 use super::reader::{SIZES, TextReader};
 use super::source::{Bytes, Source};
 use super::stream::TextStream;
-use super::{Options, Selection, Table};
+use super::{ClockColumns, Options, Selection, Table};
 
 #[cfg(feature = "columnar")]
 use super::columnar::{ColumnarReader, ColumnarStream};
@@ -85,12 +85,14 @@ impl Reader {
         }
     }
 
-    /// The columns that are times by their type; a text says of none.
-    pub fn times(&self) -> Vec<usize> {
+    /// The columns that are clocks by their type, or in a text by their names and their first values.
+    pub fn times(&self) -> Vec<ClockColumns> {
         match &self.0 {
-            AnyReader::Text(_) => Vec::new(),
+            AnyReader::Text(reader) => reader.times(),
             #[cfg(feature = "columnar")]
-            AnyReader::Columnar(reader) => reader.times(),
+            AnyReader::Columnar(reader) => {
+                reader.times().into_iter().map(|time| ClockColumns { time, date: None }).collect()
+            }
         }
     }
 

@@ -1,11 +1,13 @@
 //! What is known of a table before its rows are read.
 
+use super::clock::{self, Recognised};
 use super::dialect::Dialect;
 use super::error::{Error, Position, escaped, quoted, shortened};
 use super::number::starts_with_number;
 use super::record::Record;
 use super::shape::Column;
 use super::words::States;
+use super::{ClockColumns, Options};
 
 /// The file, its columns, and how its lines divide into fields.
 pub(super) struct Layout {
@@ -17,8 +19,9 @@ pub(super) struct Layout {
     pub(super) names: Vec<String>,
     /// Whether what follows the last of these fields, such as a comment, is left out.
     pub(super) is_open: bool,
-    /// What each column holds.
+    /// What each column holds, and in which unit, where that is known.
     pub(super) columns: Vec<Column>,
+    pub(super) units: Vec<String>,
 }
 
 /// A row that [`Record`] has read, and where it came from.
@@ -50,6 +53,43 @@ impl Layout {
     /// The two words of a column that holds nothing else.
     pub(super) fn states(&self, column: usize) -> Option<States> {
         self.columns.get(column)?.states
+    }
+
+    /// How the times of a column are written, as its name, its unit and its first values show it. None where they do not.
+    ///
+    /// # Errors
+    /// A message for dates that can be read in two ways.
+    pub(super) fn times(&self, column: usize, options: &Options) -> Result<Option<Recognised>, String> {
+        match (self.names.get(column), self.columns.get(column)) {
+            (Some(name), Some(own)) => clock::recognise(name, self.unit(column), &own.sample, options),
+            _ => Ok(None),
+        }
+    }
+
+    fn unit(&self, column: usize) -> Option<&str> {
+        self.units.get(column).map(String::as_str)
+    }
+
+    /// The columns that are clocks by their names and their first values; a column of days goes with the times of day beside it.
+    pub(super) fn clocks(&self) -> Vec<ClockColumns> {
+        let sample = |column: usize| self.columns.get(column).map(|own| &own.sample);
+        let is_day = |column| sample(column).is_some_and(clock::are_days);
+        let is_time_of_day = |column| sample(column).is_some_and(clock::are_times_of_day);
+        let mut found: Vec<ClockColumns> = (1..self.width())
+            .flat_map(|column| [(column - 1, column), (column, column - 1)])
+            .filter(|&(date, time)| is_day(date) && is_time_of_day(time))
+            .map(|(date, time)| ClockColumns { time, date: Some(date) })
+            .collect();
+        let is_clock = |column: usize| {
+            let name = &self.names[column];
+            let first = column == 0 && self.width() > 1;
+            sample(column).is_some_and(|own| clock::is_clock(name, self.unit(column), own, first))
+        };
+        let of_pairs: Vec<usize> =
+            found.iter().flat_map(|pair| [Some(pair.time), pair.date]).flatten().collect();
+        let alone = (0..self.width()).filter(|&column| !of_pairs.contains(&column) && is_clock(column));
+        found.extend(alone.map(|time| ClockColumns { time, date: None }));
+        found
     }
 
     /// A column as messages call it.

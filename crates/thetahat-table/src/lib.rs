@@ -14,7 +14,7 @@
 //! let reader = Reader::open(&path, &Options::default())?;
 //! assert_eq!(reader.names(), ["t", "u", "y"]);
 //!
-//! let selection = Selection { columns: vec![1, 2], time: Some(0) };
+//! let selection = Selection { columns: vec![1, 2], time: Some(0), date: None };
 //! let table = reader.read(&selection, &mut |_bytes, _of| {})?;
 //! assert_eq!(table.time, Some(vec![0.0, 1.0]));
 //! assert_eq!(table.columns[1], [2.0, 3.0]);
@@ -40,6 +40,7 @@
 
 mod blanks;
 mod block;
+mod clock;
 #[cfg(feature = "columnar")]
 mod columnar;
 mod decimal;
@@ -51,6 +52,7 @@ mod lines;
 mod mailbox;
 mod memory;
 mod names;
+mod names_of_times;
 mod number;
 mod reader;
 mod record;
@@ -69,6 +71,7 @@ pub use lines::Lines;
 pub use mailbox::{Event, Waker};
 pub use memory::Bound;
 pub use names::{list, names};
+pub use time::Unit;
 
 /// Where a log has the names of its columns.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -102,8 +105,10 @@ pub struct Options {
     pub values: Vec<(String, f64)>,
     /// The encoding of the text, if it is neither UTF-8 nor marked as UTF-16.
     pub encoding: Option<&'static encoding_rs::Encoding>,
-    /// How times are written, in the manner of strptime, if they are neither seconds nor ISO 8601.
+    /// How times are written, in the manner of strptime; recognised from the first rows if it is not given.
     pub time_format: Option<String>,
+    /// The unit of times that are numbers; by their name and their size if it is not given, else seconds.
+    pub time_unit: Option<Unit>,
     /// What memory there is for; times count as values, too.
     pub bound: Option<Bound>,
 }
@@ -142,6 +147,17 @@ pub struct Selection {
     pub columns: Vec<usize>,
     /// The column of times.
     pub time: Option<usize>,
+    /// The column of the days that these are times of, if it is another.
+    pub date: Option<usize>,
+}
+
+/// The columns of a clock.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub struct ClockColumns {
+    /// The column of times.
+    pub time: usize,
+    /// The column of the days that these are times of, if it is another.
+    pub date: Option<usize>,
 }
 
 impl Table {
@@ -162,9 +178,10 @@ impl Table {
 pub struct Table {
     /// The selected columns, in the selection's order; a missing value is NaN.
     pub columns: Vec<Vec<f64>>,
-    /// The times in seconds: as they are if they are numbers, and since the first one if they are dates.
+    /// The times in seconds: as they are if they are numbers, and since the first one if they are dates, or numbers that count from
+    /// 1970 or from another day.
     pub time: Option<Vec<f64>>,
-    /// The first time as it is written, if it is a date.
+    /// The first time in ISO 8601, if it is a date.
     pub start: Option<String>,
     /// The number of rows.
     pub rows: usize,

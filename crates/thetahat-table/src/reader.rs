@@ -14,9 +14,9 @@ use super::rows::{Plan, Rows};
 use super::shape::{self, Column, Shape};
 use super::source::Source;
 use super::stream::{Text, TextStream};
-use super::time::Clock;
+use super::time::{Clock, Times};
 use super::words::Tally;
-use super::{Options, Selection, Table};
+use super::{ClockColumns, Options, Selection, Table};
 
 /// How much is held in memory and handled at a time, in bytes.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +99,14 @@ impl TextReader {
             options: options.clone(),
             sizes,
             source,
-            layout: Layout { file, dialect, names: Vec::new(), is_open: shape.width.is_some(), columns },
+            layout: Layout {
+                file,
+                dialect,
+                names: Vec::new(),
+                is_open: shape.width.is_some(),
+                columns,
+                units: shape.units,
+            },
             undecoded_names: Vec::new(),
             numbers,
             told: Vec::new(),
@@ -209,6 +216,11 @@ impl TextReader {
         (0..self.layout.width()).map(of).collect()
     }
 
+    /// The columns that are clocks by their names and their first values.
+    pub(super) fn times(&self) -> Vec<ClockColumns> {
+        self.layout.clocks()
+    }
+
     /// The columns of which the name is not UTF-8 and cannot be shown.
     pub(super) fn nameless(&self) -> impl Iterator<Item = usize> {
         self.undecoded_names.iter().map(|(column, _)| *column)
@@ -216,14 +228,15 @@ impl TextReader {
 
     /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
     pub(super) fn read_parts(
-        self,
+        mut self,
         selection: &Selection,
         most: Option<usize>,
         progress: &mut dyn FnMut(u64, Option<u64>),
         take: &mut dyn FnMut(Table) -> ControlFlow<()>,
     ) -> Result<(), Error> {
         let fields = self.fields(selection)?;
-        let (clock, start) = self.clock(selection)?;
+        let times = self.clock(selection)?;
+        let start = times.start.clone();
         let Self {
             options,
             sizes,
@@ -241,7 +254,7 @@ impl TextReader {
         let plan = Plan {
             layout,
             numbers,
-            clock,
+            times,
             fields,
             time: selection.time,
             has_statuses: AtomicBool::new(false),
@@ -305,24 +318,24 @@ impl TextReader {
     /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
     /// from the first one.
     pub(super) fn stream(
-        self,
+        mut self,
         selection: &Selection,
         whole_lines: bool,
         start: Option<&str>,
     ) -> Result<TextStream, Error> {
         let fields = self.fields(selection)?;
-        let (mut clock, mut first) = self.clock(selection)?;
-        if let (Some(start), Clock::Calendar { .. }) = (start, &clock) {
-            clock = Clock::decide(start.as_bytes(), self.options.time_format.as_deref(), &self.numbers)
-                .map_err(|message| Error::data(&self.layout.file, None, message))?;
-            first = Some(start.to_owned());
+        let mut times = self.clock(selection)?;
+        if let (Some(start), Some(_)) = (start, &times.start) {
+            times =
+                times.counted_from(start).map_err(|message| Error::data(&self.layout.file, None, message))?;
         }
+        let first = times.start.clone();
         let Self { source, layout, numbers, mut told, current, position, line, .. } = self;
         let text = current.raw().get(position..).unwrap_or_default().to_vec();
         let plan = Plan {
             layout,
             numbers,
-            clock,
+            times,
             fields,
             time: selection.time,
             has_statuses: AtomicBool::new(false),
@@ -337,7 +350,8 @@ impl TextReader {
 
     /// The selected fields in ascending order, if the selection makes sense.
     fn fields(&self, selection: &Selection) -> Result<Vec<usize>, Error> {
-        let mut fields: Vec<usize> = selection.columns.iter().copied().chain(selection.time).collect();
+        let all = selection.columns.iter().copied().chain(selection.time).chain(selection.date);
+        let mut fields: Vec<usize> = all.collect();
         fields.sort_unstable();
         let unusable = |message| Err(Error::data(&self.layout.file, None, message));
         if let Some(twice) = fields.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -353,19 +367,38 @@ impl TextReader {
         }
     }
 
-    /// Decides by the first row how times are written, and returns the first one if it is a date.
-    fn clock(&self, selection: &Selection) -> Result<(Clock, Option<String>), Error> {
-        let row = self.row();
-        match selection.time {
-            // A row of another width is refused when it is read.
-            Some(index) if row.record.len() == self.layout.width() => {
-                let field = self.layout.dialect.trimmed(row.record.field(index));
-                let clock = Clock::decide(field, self.options.time_format.as_deref(), &self.numbers)
-                    .map_err(|message| self.layout.first_fault(&row, index, &message))?;
-                let is_date = matches!(clock, Clock::Calendar { .. });
-                Ok((clock, is_date.then(|| String::from_utf8_lossy(field).into_owned())))
-            }
-            _ => Ok((Clock::Seconds, None)),
+    /// How the times of the selected columns are read, from those in the first row on.
+    fn clock(&mut self, selection: &Selection) -> Result<Times, Error> {
+        let Selection { time: Some(time), date, .. } = *selection else { return Ok(Times::default()) };
+        // A row of another width is refused when it is read.
+        if self.record.len() < self.layout.width() {
+            return Ok(Times::default());
         }
+        let own = self.column_clock(time)?;
+        let days = date.map(|date| self.column_clock(date)).transpose()?;
+        let row = self.row();
+        let field = |column| self.layout.dialect.trimmed(row.record.field(column));
+        let start = match (&days, date) {
+            (Some(days), Some(date)) => days.start_at(&own).or_else(|| days.start(field(date))),
+            _ => own.start(field(time)),
+        };
+        Ok(Times { clock: own, date, days, start })
+    }
+
+    /// How the times of a column are read.
+    fn column_clock(&mut self, column: usize) -> Result<Clock, Error> {
+        let row = self.row();
+        let field = self.layout.dialect.trimmed(row.record.field(column));
+        let fault = |message: String| self.layout.first_fault(&row, column, &message);
+        let recognised = self.layout.times(column, &self.options).map_err(fault)?;
+        let clock = match &recognised {
+            Some(known) => Clock::begin(field, &known.written, &self.numbers),
+            None => Clock::decide(field, self.options.time_format.as_deref(), &self.numbers),
+        };
+        let clock = clock.map_err(fault)?;
+        if let Some(told) = recognised.and_then(|known| known.told) {
+            self.told.push(self.layout.told(&format!("{}: {told}", self.layout.column(column))));
+        }
+        Ok(clock)
     }
 }

@@ -20,7 +20,7 @@ use super::layout::{Layout, Row};
 use super::lines::Lines;
 use super::number::Numbers;
 use super::record::Record;
-use super::time::Clock;
+use super::time::{Clock, Times};
 use super::words::{self, States, Tally};
 use super::{Selection, Table};
 
@@ -31,7 +31,7 @@ pub(super) struct Plan {
     /// How numbers are written.
     pub(super) numbers: Numbers,
     /// How times are written.
-    pub(super) clock: Clock,
+    pub(super) times: Times,
     /// The fields to read, in ascending order.
     pub(super) fields: Vec<usize>,
     /// The one of them that is the time.
@@ -136,7 +136,13 @@ impl Plan {
         let mut take = |field| rows.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
         Table {
             columns: selection.columns.iter().map(&mut take).collect(),
-            time: selection.time.as_ref().map(take),
+            time: selection.time.as_ref().map(|time| {
+                let mut times = take(time);
+                if let Some(date) = &selection.date {
+                    times.iter_mut().zip(take(date)).for_each(|(time, day)| *time += day);
+                }
+                times
+            }),
             start,
             rows: rows.count,
             lines: rows.lines,
@@ -252,10 +258,18 @@ impl Plan {
         None
     }
 
+    /// How the times in a field are written, if it has some.
+    fn clock(&self, index: usize) -> Option<&Clock> {
+        if self.time == Some(index) {
+            return Some(&self.times.clock);
+        }
+        self.times.days.as_ref().filter(|_| self.times.date == Some(index))
+    }
+
     /// Whether what is in a field is meant as a number.
     fn has_numbers(&self, index: usize) -> bool {
-        if self.time == Some(index) {
-            matches!(self.clock, Clock::Seconds)
+        if let Some(clock) = self.clock(index) {
+            matches!(clock, Clock::Seconds)
         } else {
             self.layout.states(index).is_none()
         }
@@ -285,8 +299,8 @@ impl Plan {
 
     /// Reads the content of a field; an error is a message. A status that historians write is a missing value that remembers it.
     fn content(&self, content: &[u8], index: usize) -> Result<f64, String> {
-        if self.time == Some(index) {
-            return self.clock.read(content, &self.numbers);
+        if let Some(clock) = self.clock(index) {
+            return clock.read(content, &self.numbers);
         }
         if let Some(states) = self.layout.states(index) {
             return self.state(content, states);

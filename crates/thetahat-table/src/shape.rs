@@ -5,6 +5,7 @@
 //! above is left out. Whatever was not certain is said in [`Shape::words`], with the option that says otherwise.
 
 use super::blanks;
+use super::clock::Sample;
 use super::dialect::Dialect;
 use super::error::{escaped, shortened};
 use super::number::{Notation, Numbers};
@@ -38,14 +39,13 @@ pub(super) struct Shape {
     pub(super) grouped: bool,
     pub(super) columns: Vec<Column>,
     /// The units of the columns, where a line has them.
-    #[expect(dead_code)]
     pub(super) units: Vec<String>,
     /// What the reader should know, in plain words.
     pub(super) words: Vec<String>,
 }
 
 /// What a column holds, as far as the first rows show it.
-#[derive(Clone, Debug, Default, Eq, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Column {
     /// Two words for off and on, and nothing else.
     pub(super) states: Option<States>,
@@ -53,6 +53,8 @@ pub(super) struct Column {
     pub(super) words: Vec<String>,
     /// Whether it holds something, but not one number.
     pub(super) no_numbers: bool,
+    /// Its values, as far as they may be times.
+    pub(super) sample: Sample,
 }
 
 /// What is in a field.
@@ -90,7 +92,16 @@ impl Sort {
 
 /// Whether a field looks like a date or a time of day.
 fn is_date(field: &[u8]) -> bool {
+    const MONTHS: [&[u8]; 12] =
+        [b"Jan", b"Feb", b"Mar", b"Apr", b"May", b"Jun", b"Jul", b"Aug", b"Sep", b"Oct", b"Nov", b"Dec"];
     let allowed = |byte: &u8| byte.is_ascii_digit() || b" -/:.,TZ+apmAPM[]_".contains(byte);
+    // As in 10-Jan-2024.
+    if let [_, b'-', rest @ ..] | [_, _, b'-', rest @ ..] = field
+        && let Some((month, rest)) = rest.split_at_checked(3)
+        && MONTHS.iter().any(|known| known.eq_ignore_ascii_case(month))
+    {
+        return rest.first() == Some(&b'-') && rest[1..].iter().all(allowed);
+    }
     let digits = field.iter().filter(|byte| byte.is_ascii_digit()).count();
     let zone = field.iter().position(|&byte| byte == b'[').unwrap_or(field.len());
     field.first().is_some_and(u8::is_ascii_digit)
@@ -344,10 +355,29 @@ impl Shape {
                     states,
                     words: if no_numbers && dates == 0 { words } else { Vec::new() },
                     no_numbers,
+                    sample: Sample::default(),
                 }
             })
             .collect();
         self.read_notation(&shown, &example, options);
+        self.read_samples(lines, rows, options);
+    }
+
+    /// Reads the columns that may be times.
+    fn read_samples(&mut self, lines: &Lines<'_>, rows: &[&Line], options: &Options) {
+        let numbers = Numbers::new(self.decimal_comma, &options.missing).with(self.grouped, &options.values);
+        let mut record = Record::new(self.dialect.delimiter);
+        for line in rows {
+            record.read(&lines.text[line.start..]);
+            for ((field, sort), column) in line.sorts.iter().enumerate().zip(&mut self.columns) {
+                let text = self.dialect.trimmed(record.field(field));
+                match sort {
+                    Sort::Number => column.sample.numbers.extend(numbers.read(text)),
+                    Sort::Date => column.sample.dates.push(String::from_utf8_lossy(text).into_owned()),
+                    _ => {}
+                }
+            }
+        }
     }
 
     /// Decides what a comma and a point in numbers mean.

@@ -33,6 +33,7 @@ pub(super) struct TextStream {
     /// Where each selected column is among the fields, and where the time is.
     places: Vec<usize>,
     time: Option<usize>,
+    date: Option<usize>,
     /// What was read and not yet parsed, from `position` on.
     text: Vec<u8>,
     position: usize,
@@ -83,6 +84,7 @@ impl TextStream {
             values: vec![0.0; selection.columns.len()],
             places: selection.columns.iter().map(place).collect(),
             time: selection.time.as_ref().map(place),
+            date: selection.date.as_ref().map(place),
             record: Record::new(plan.layout.dialect.delimiter),
             words,
             tallies: vec![Tally::default(); plan.fields.len()],
@@ -117,7 +119,8 @@ impl TextStream {
 
     /// The time of the row at hand in seconds, as [`Table::time`](super::Table).
     pub(super) fn time(&self) -> Option<f64> {
-        self.fields.get(self.time?).copied()
+        let time = self.fields.get(self.time?).copied()?;
+        Some(time + self.date.and_then(|date| self.fields.get(date)).copied().unwrap_or_default())
     }
 
     /// The line on which the row at hand is, or the malformed one.

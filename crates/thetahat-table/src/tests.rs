@@ -39,7 +39,7 @@ fn start(bytes: &[u8], options: &Options, sizes: Sizes) -> Result<TextReader, Er
 fn read_all(bytes: &[u8], options: &Options, time: bool, sizes: Sizes) -> Result<Table, Error> {
     let reader = start(bytes, options, sizes)?;
     let columns = (usize::from(time)..reader.names().len()).collect();
-    reader.read(&Selection { columns, time: time.then_some(0) }, &mut |_, _| {})
+    reader.read(&Selection { columns, time: time.then_some(0), date: None }, &mut |_, _| {})
 }
 
 fn table(text: &str, options: &Options) -> Table {
@@ -90,7 +90,7 @@ fn names_are_given_as_they_are() {
 #[test]
 fn columns_come_in_the_order_of_the_selection() {
     let reader = start(b"a,b,c,d\nx,1,2,3\ny,4,5,6\n", &plain(), SIZES).unwrap();
-    let selection = Selection { columns: vec![3, 1], time: Some(2) };
+    let selection = Selection { columns: vec![3, 1], time: Some(2), date: None };
     let table = reader.read(&selection, &mut |_, _| {}).unwrap();
     assert_eq!(table.columns, [[3.0, 6.0], [1.0, 4.0]]);
     assert_eq!(table.time, Some(vec![2.0, 5.0]));
@@ -103,7 +103,7 @@ fn columns_come_in_the_order_of_the_selection() {
 fn a_selection_must_make_sense() {
     let select = |columns: Vec<usize>, time| {
         let reader = start(b"u,y\n1,2\n", &plain(), SIZES).unwrap();
-        reader.read(&Selection { columns, time }, &mut |_, _| {}).unwrap_err().to_string()
+        reader.read(&Selection { columns, time, date: None }, &mut |_, _| {}).unwrap_err().to_string()
     };
     assert_eq!(select(vec![0, 2], None), "log.csv: there is no column 3; select from the first 2");
     assert_eq!(select(vec![1, 0, 1], None), "log.csv: column 'y' is selected twice; select it once");
@@ -180,7 +180,8 @@ fn comments_and_units_are_left_out() {
 fn quotes_protect_delimiters_and_line_breaks() {
     let text = "t,note,y\n1,plain,2\n3,\"a,\nb \"\"c\"\"\n\",4\n5,\"\",\"6\"\n7,\"\n\",8";
     let reader = start(text.as_bytes(), &plain(), SIZES).unwrap();
-    let table = reader.read(&Selection { columns: vec![0, 2], time: None }, &mut |_, _| {}).unwrap();
+    let table =
+        reader.read(&Selection { columns: vec![0, 2], time: None, date: None }, &mut |_, _| {}).unwrap();
     assert_eq!(table.columns, [[1.0, 3.0, 5.0, 7.0], [2.0, 4.0, 6.0, 8.0]]);
     let lines: Vec<_> = (0..4).map(|row| table.lines.of(row)).collect();
     assert_eq!(lines, [2, 3, 6, 7]);
@@ -270,7 +271,8 @@ fn values_that_are_no_numbers() {
 #[test]
 fn only_selected_columns_are_parsed() {
     let reader = start(b"t,note,y\n1,abc,2\n3,\xff,4\n5,,6\n", &plain(), SIZES).unwrap();
-    let table = reader.read(&Selection { columns: vec![2], time: Some(0) }, &mut |_, _| {}).unwrap();
+    let table =
+        reader.read(&Selection { columns: vec![2], time: Some(0), date: None }, &mut |_, _| {}).unwrap();
     assert_eq!(table.columns, [[2.0, 4.0, 6.0]]);
 }
 
@@ -424,7 +426,9 @@ fn encodings() {
             let options = Options { delimiter: Some(b';'), ..options.clone() };
             let reader = start(&bytes, &options, sizes(block, 8)).unwrap();
             assert_eq!(reader.names(), ["t", "T °C"]);
-            let table = reader.read(&Selection { columns: vec![0, 1], time: None }, &mut |_, _| {}).unwrap();
+            let table = reader
+                .read(&Selection { columns: vec![0, 1], time: None, date: None }, &mut |_, _| {})
+                .unwrap();
             assert_eq!(table.columns, [[1.0], [2.0]]);
         }
     }
@@ -433,7 +437,7 @@ fn encodings() {
 #[test]
 fn a_name_that_is_not_utf8_matters_if_its_column_is_used() {
     let open = || start(b"t;T \xb0C\n1;2\n", &plain(), SIZES).unwrap();
-    let select = |column| Selection { columns: vec![column], time: None };
+    let select = |column| Selection { columns: vec![column], time: None, ..Selection::default() };
     assert_eq!(open().read(&select(0), &mut |_, _| {}).unwrap().rows, 1);
     assert_eq!(
         open().read(&select(1), &mut |_, _| {}).unwrap_err().to_string(),
@@ -475,7 +479,7 @@ fn times() {
     );
     assert!(error("t,y\n2024-03-01,1\n5,2\n").starts_with("log.csv:3:1: column 't': \"5\" is not a date"));
     assert!(error("t,y\nx,5\n1,2\n").ends_with("if this row holds units, leave it out with `skip-rows`"));
-    assert!(error("t,y\n12:00,1\n").contains("`time-format`"));
+    assert!(error("t,y\n12:00h,1\n").contains("`time-format`"));
     assert!(error("t,y\n,1\n").contains("the time is missing"));
     // A ragged first row is that in the first place.
     assert!(error("t,y\nx\n1,2\n").starts_with("log.csv:2:2: this row has 1 field"));
@@ -519,7 +523,7 @@ fn a_file_on_disk() {
     let path: PathBuf = std::env::temp_dir().join(format!("thetahat-table-{}.csv", std::process::id()));
     std::fs::write(&path, "u,y\n1,2\n3,4\n").unwrap();
     let mut calls = Vec::new();
-    let selection = Selection { columns: vec![0, 1], time: None };
+    let selection = Selection { columns: vec![0, 1], time: None, ..Selection::default() };
     let read = Reader::open(&path, &plain())
         .and_then(|reader| reader.read(&selection, &mut |bytes, total| calls.push((bytes, total))));
     std::fs::remove_file(&path).unwrap();
@@ -552,7 +556,7 @@ fn a_stream_that_breaks_off() {
         let stream = Breaking { bytes: Cursor::new(text.as_bytes().to_vec()), interrupt: false };
         let source = Source::new(Bytes::new("stream", stream, None)?, None);
         let reader = TextReader::start(source, &comma(), sizes(16, 8))?;
-        reader.read(&Selection { columns: vec![0, 1], time: None }, &mut |_, _| {})
+        reader.read(&Selection { columns: vec![0, 1], time: None, date: None }, &mut |_, _| {})
     };
     let text = "u,y\n1,2\n3,4\n5,6\n7,8\n9,10\n".to_owned();
     assert_eq!(read(&text).unwrap_err().to_string(), "stream: cannot be read: cable pulled");
@@ -569,7 +573,9 @@ fn progress_counts_stored_bytes() {
         let mut calls = Vec::new();
         let reader = start(bytes, &plain(), sizes(500, 100)).unwrap();
         let table = reader
-            .read(&Selection { columns: vec![0], time: None }, &mut |read, total| calls.push((read, total)))
+            .read(&Selection { columns: vec![0], time: None, date: None }, &mut |read, total| {
+                calls.push((read, total))
+            })
             .unwrap();
         assert_eq!(table.rows, 1000);
         assert!(calls.len() > 5);

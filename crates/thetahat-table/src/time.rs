@@ -5,14 +5,128 @@ use jiff::fmt::strtime::BrokenDownTime;
 use jiff::fmt::temporal::Pieces;
 use jiff::tz::Offset;
 
+use super::clock::Written;
 use super::error::{escaped, quoted};
 use super::number::Numbers;
+
+/// A unit in which numbers count time.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum Unit {
+    /// 1e-9 s.
+    Nanoseconds,
+    /// 1e-6 s.
+    Microseconds,
+    /// 1e-3 s.
+    Milliseconds,
+    /// Seconds.
+    Seconds,
+    /// 60 s.
+    Minutes,
+    /// 3600 s.
+    Hours,
+    /// 86400 s.
+    Days,
+}
+
+impl Unit {
+    const ALL: [Self; 7] = [
+        Self::Nanoseconds,
+        Self::Microseconds,
+        Self::Milliseconds,
+        Self::Seconds,
+        Self::Minutes,
+        Self::Hours,
+        Self::Days,
+    ];
+    /// Those in which times since 1970 are counted.
+    pub(super) const EPOCHS: [Self; 4] =
+        [Self::Seconds, Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
+
+    /// A unit by its symbol, or by one of its names in lower case.
+    ///
+    /// ```
+    /// use thetahat_table::Unit;
+    ///
+    /// assert_eq!(Unit::of("ms"), Some(Unit::Milliseconds));
+    /// assert_eq!(Unit::of("mV"), None);
+    /// ```
+    pub fn of(text: &str) -> Option<Self> {
+        Some(match text {
+            "ns" | "nsec" | "nanos" | "nanoseconds" => Self::Nanoseconds,
+            "us" | "\u{b5}s" | "\u{3bc}s" | "usec" | "micros" | "microseconds" => Self::Microseconds,
+            "ms" | "msec" | "millis" | "milliseconds" => Self::Milliseconds,
+            "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => Self::Seconds,
+            "min" | "mins" | "minute" | "minutes" | "minuten" => Self::Minutes,
+            "h" | "hr" | "hrs" | "hour" | "hours" | "stunden" => Self::Hours,
+            "d" | "day" | "days" | "tage" => Self::Days,
+            _ => return None,
+        })
+    }
+
+    /// How many nanoseconds one is.
+    pub(super) fn nanoseconds(self) -> i128 {
+        match self {
+            Self::Nanoseconds => 1,
+            Self::Microseconds => 1_000,
+            Self::Milliseconds => 1_000_000,
+            Self::Seconds => 1_000_000_000,
+            Self::Minutes => 60_000_000_000,
+            Self::Hours => 3_600_000_000_000,
+            Self::Days => 86_400_000_000_000,
+        }
+    }
+
+    /// Its symbol.
+    pub(super) fn symbol(self) -> &'static str {
+        Self::NAMES[Self::ALL.iter().position(|unit| *unit == self).unwrap_or_default()].0
+    }
+
+    /// Its name.
+    pub(super) fn name(self) -> &'static str {
+        Self::NAMES[Self::ALL.iter().position(|unit| *unit == self).unwrap_or_default()].1
+    }
+
+    const NAMES: [(&'static str, &'static str); 7] = [
+        ("ns", "nanoseconds"),
+        ("us", "microseconds"),
+        ("ms", "milliseconds"),
+        ("s", "seconds"),
+        ("min", "minutes"),
+        ("h", "hours"),
+        ("d", "days"),
+    ];
+
+    /// A number of them in seconds.
+    fn seconds(self, number: f64) -> f64 {
+        // A division by a power of ten is exact to the last digit, a product with its inverse is not.
+        match self {
+            Self::Nanoseconds => number / 1e9,
+            Self::Microseconds => number / 1e6,
+            Self::Milliseconds => number / 1e3,
+            Self::Seconds => number,
+            Self::Minutes => number * 60.0,
+            Self::Hours => number * 3600.0,
+            Self::Days => number * 86_400.0,
+        }
+    }
+}
 
 /// How the times are written, decided by the first one.
 #[derive(Clone, Debug)]
 pub(super) enum Clock {
     /// Seconds, as numbers.
     Seconds,
+    /// Numbers in another unit, as they are.
+    Numbers(Unit),
+    /// Numbers in a unit, returned as seconds since the first one.
+    Since {
+        unit: Unit,
+        /// The first one, and exactly if it is whole.
+        first: f64,
+        whole: Option<i64>,
+        /// When that is.
+        instant: Timestamp,
+    },
     /// Dates and times of day, returned as seconds since the first one.
     Calendar {
         /// A format in the manner of strptime; without one, ISO 8601.
@@ -22,7 +136,112 @@ pub(super) enum Clock {
     },
 }
 
+/// The times of a log, of one column or of two.
+#[derive(Clone, Debug)]
+pub(super) struct Times {
+    /// How the times are written.
+    pub(super) clock: Clock,
+    /// The column of the days that these are times of, if it is another, and how they are written.
+    pub(super) date: Option<usize>,
+    pub(super) days: Option<Clock>,
+    /// The first time in ISO 8601, if it is a date.
+    pub(super) start: Option<String>,
+}
+
+impl Default for Times {
+    fn default() -> Self {
+        Self { clock: Clock::Seconds, date: None, days: None, start: None }
+    }
+}
+
+impl Times {
+    /// The same times counted from another start, in ISO 8601. An error is a message.
+    pub(super) fn counted_from(self, start: &str) -> Result<Self, String> {
+        let (clock, days) = match self.days {
+            None => (self.clock.counted_from(start)?, None),
+            // The days count from there, and the times of day from midnight.
+            Some(days) => (self.clock.counted_from("1970-01-01")?, Some(days.counted_from(start)?)),
+        };
+        Ok(Self { clock, days, start: Some(start.to_owned()), ..self })
+    }
+}
+
 impl Clock {
+    /// A clock whose times are written like this, from the first one on. An error is a message.
+    pub(super) fn begin(field: &[u8], written: &Written, numbers: &Numbers) -> Result<Self, String> {
+        if numbers.is_missing(field) {
+            return Err(MISSING.to_owned());
+        }
+        match written {
+            Written::Numbers(Unit::Seconds) => Self::decide(field, None, numbers),
+            Written::Numbers(unit) => number(field, numbers).map(|_| Self::Numbers(*unit)),
+            Written::Since(unit, origin) => {
+                let (first, whole) = (number(field, numbers)?, whole_number(field));
+                let nanoseconds = match whole {
+                    Some(whole) => i128::from(whole) * unit.nanoseconds(),
+                    // Spreadsheets keep microseconds.
+                    None => (first * (unit.nanoseconds() / 1_000) as f64).round() as i128 * 1_000,
+                };
+                let instant = Timestamp::from_nanosecond(nanoseconds + origin)
+                    .map_err(|_| format!("{} is no time since 1970 in {}", quoted(field), unit.name()))?;
+                Ok(Self::Since { unit: *unit, first, whole, instant })
+            }
+            Written::Dates(format) => Self::decide(field, format.as_deref(), numbers),
+        }
+    }
+
+    /// The first time in ISO 8601: as it is written if it is that. None of times that are mere numbers.
+    pub(super) fn start(&self, field: &[u8]) -> Option<String> {
+        match self {
+            Self::Seconds | Self::Numbers(_) => None,
+            Self::Since { unit: Unit::Days, instant, .. } => Some(civil(*instant)),
+            Self::Since { instant, .. } => Some(instant.to_string()),
+            Self::Calendar { format: None, .. } => Some(String::from_utf8_lossy(field).into_owned()),
+            // A time of day alone has no day.
+            Self::Calendar { format: Some(_), first } if is_first_day(*first) => {
+                Some(String::from_utf8_lossy(field).into_owned())
+            }
+            Self::Calendar { format: Some(format), first } => {
+                let zoned = ["%z", "%:z", "%Z", "%s", "%Q"].iter().any(|part| format.contains(part));
+                Some(if zoned { first.to_string() } else { civil(*first) })
+            }
+        }
+    }
+
+    /// The first time of a clock of days whose times of day are in another column, in ISO 8601; none if one of them has no calendar.
+    pub(super) fn start_at(&self, times: &Self) -> Option<String> {
+        match (self, times) {
+            // Times of day count from the beginning of 1970.
+            (Self::Calendar { first: day, .. }, Self::Calendar { first: time, .. }) => {
+                Timestamp::from_nanosecond(day.as_nanosecond() + time.as_nanosecond()).ok().map(civil)
+            }
+            _ => None,
+        }
+    }
+
+    /// The same clock with its times counted from another start, in ISO 8601. An error is a message.
+    pub(super) fn counted_from(self, start: &str) -> Result<Self, String> {
+        let from = || match &self {
+            Self::Calendar { format: Some(format), first } if is_first_day(*first) => {
+                instant(start.as_bytes(), Some(format))
+            }
+            _ => instant(start.as_bytes(), None),
+        };
+        if matches!(self, Self::Seconds | Self::Numbers(_)) {
+            return Ok(self);
+        }
+        let from = from()?;
+        Ok(match self {
+            Self::Seconds | Self::Numbers(_) => self,
+            Self::Calendar { format, .. } => Self::Calendar { format, first: from },
+            Self::Since { unit, first, instant, .. } => {
+                let ahead =
+                    (from.as_nanosecond() - instant.as_nanosecond()) as f64 / unit.nanoseconds() as f64;
+                Self::Since { unit, first: first + ahead, whole: None, instant: from }
+            }
+        })
+    }
+
     /// Decides by the first time how the others are written; an error is a message.
     pub(super) fn decide(field: &[u8], format: Option<&str>, numbers: &Numbers) -> Result<Self, String> {
         if numbers.is_missing(field) {
@@ -40,13 +259,13 @@ impl Clock {
     pub(super) fn read(&self, field: &[u8], numbers: &Numbers) -> Result<f64, String> {
         match self {
             _ if numbers.is_missing(field) => Err(MISSING.to_owned()),
-            Self::Seconds => numbers.read(field).map_err(|message| match instant(field, None) {
-                Ok(_) => format!(
-                    "{} is a date, but the first time is a number; write all times alike",
-                    quoted(field)
-                ),
-                Err(_) => message,
-            }),
+            Self::Seconds => number(field, numbers),
+            Self::Numbers(unit) => Ok(unit.seconds(number(field, numbers)?)),
+            Self::Since { unit, first, whole, .. } => match (whole_number(field), whole) {
+                // Whole numbers are exact: nanoseconds since 1970 have more digits than a number has.
+                (Some(now), Some(first)) => Ok(unit.seconds((i128::from(now) - i128::from(*first)) as f64)),
+                _ => Ok(unit.seconds(number(field, numbers)? - first)),
+            },
             Self::Calendar { format, first } => {
                 let now = instant(field, format.as_deref())?;
                 // Whole nanoseconds up to here: as seconds since 1970 both would have lost their last digits.
@@ -59,8 +278,33 @@ impl Clock {
 /// The message for a time that is not there.
 pub(super) const MISSING: &str = "the time is missing; fill it in, or take the row out";
 
+/// Whether an instant is on the day that stands for all, where times have none.
+fn is_first_day(instant: Timestamp) -> bool {
+    (0..86_400).contains(&instant.as_second())
+}
+
+/// An instant as the clocks on a wall show it that have no zone.
+fn civil(instant: Timestamp) -> String {
+    Offset::UTC.to_datetime(instant).to_string()
+}
+
+/// A number that has nothing but digits.
+fn whole_number(field: &[u8]) -> Option<i64> {
+    std::str::from_utf8(field).ok()?.parse().ok()
+}
+
+/// A time that is a number.
+fn number(field: &[u8], numbers: &Numbers) -> Result<f64, String> {
+    numbers.read(field).map_err(|message| match instant(field, None) {
+        Ok(_) => {
+            format!("{} is a date, but the first time is a number; write all times alike", quoted(field))
+        }
+        Err(_) => message,
+    })
+}
+
 /// Reads a date and time of day; one without an offset is in UTC.
-fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
+pub(super) fn instant(field: &[u8], format: Option<&str>) -> Result<Timestamp, String> {
     match format {
         Some(format) => formatted(field, format).map_err(|reason| {
             format!(

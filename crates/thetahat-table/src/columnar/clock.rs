@@ -56,12 +56,11 @@ impl Clock {
                 let numbers = Numbers::new(false, &[]);
                 let texts = texts(array);
                 let first = texts.first().copied().flatten().ok_or(time::MISSING)?;
-                let decide = |text: &str| time::Clock::decide(text.trim().as_bytes(), format, &numbers);
-                let mut clock = decide(first)?;
-                let mut written =
-                    matches!(clock, time::Clock::Calendar { .. }).then(|| first.trim().to_owned());
+                let field = first.trim().as_bytes();
+                let mut clock = time::Clock::decide(field, format, &numbers)?;
+                let mut written = clock.start(field);
                 if let (Some(start), Some(_)) = (start, &written) {
-                    (clock, written) = (decide(start)?, Some(start.to_owned()));
+                    (clock, written) = (clock.counted_from(start)?, Some(start.to_owned()));
                 }
                 Ok(Self { ticks: Ticks::Texts(clock, numbers), start: written })
             }
@@ -140,6 +139,6 @@ fn offset(zone: &str) -> Option<Offset> {
 fn instant(start: &str) -> Result<i128, String> {
     match time::Clock::decide(start.as_bytes(), None, &Numbers::new(false, &[]))? {
         time::Clock::Calendar { first, .. } => Ok(first.as_nanosecond()),
-        time::Clock::Seconds => Err(format!("the start {start} is no date")),
+        _ => Err(format!("the start {start} is no date")),
     }
 }

@@ -15,7 +15,7 @@ use parquet::file::properties::WriterProperties;
 use tempfile::TempDir;
 
 use crate::memory::Bound;
-use crate::{Error, ErrorKind, Event, Header, Options, Reader, Selection, Table};
+use crate::{ClockColumns, Error, ErrorKind, Event, Header, Options, Reader, Selection, Table};
 
 /// The formats by the ending of a file's name.
 const FORMATS: [&str; 3] = ["parquet", "arrow", "arrows"];
@@ -79,7 +79,7 @@ fn read(bytes: &[u8], columns: &[&str], time: Option<&str>, options: &Options) -
 
 fn selection(reader: &Reader, columns: &[&str], time: Option<&str>) -> Selection {
     let place = |name: &&str| reader.names().iter().position(|other| other == name).unwrap_or(99);
-    Selection { columns: columns.iter().map(place).collect(), time: time.as_ref().map(place) }
+    Selection { columns: columns.iter().map(place).collect(), time: time.as_ref().map(place), date: None }
 }
 
 fn error(bytes: &[u8], columns: &[&str], time: Option<&str>) -> String {
@@ -369,7 +369,7 @@ fn columns_that_hold_no_numbers_are_known_and_refused() {
         let log = written(&bytes);
         let reader = Reader::open(&log.path, &Options::default()).unwrap();
         assert_eq!(reader.words(), [true, true, true, true, true, false, false]);
-        assert_eq!((reader.times(), reader.nameless()), (vec![4], vec![]));
+        assert_eq!((reader.times(), reader.nameless()), (vec![ClockColumns { time: 4, date: None }], vec![]));
         for (column, expected) in [
             ("list", "column 'list' is of the type List"),
             ("pair", "column 'pair' is of the type Struct"),

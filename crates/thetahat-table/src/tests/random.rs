@@ -99,7 +99,7 @@ fn the_first_mistake_is_told_whatever_the_cuts_and_threads() {
         let text = format!("a,b,c\n{}\n", lines.join("\n"));
         let read = |sizes| {
             let reader = start(text.as_bytes(), &comma(), sizes)?;
-            reader.read(&Selection { columns: vec![0, 2], time: None }, &mut |_, _| {})
+            reader.read(&Selection { columns: vec![0, 2], time: None, date: None }, &mut |_, _| {})
         };
         let expected = read(SIZES).unwrap_err();
         let first = mistakes.iter().min().unwrap();

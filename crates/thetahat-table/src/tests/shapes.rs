@@ -13,7 +13,7 @@ fn read_with(text: &str, options: &Options) -> (Vec<String>, Vec<Vec<f64>>, Vec<
     // Whatever holds numbers, and the words that stand for them.
     let numeric = reader.words().iter().map(|words| !words).collect::<Vec<_>>();
     let columns = (0..names.len()).filter(|&column| numeric[column]).collect();
-    let table = reader.read(&Selection { columns, time: None }, &mut |_, _| {}).unwrap();
+    let table = reader.read(&Selection { columns, time: None, date: None }, &mut |_, _| {}).unwrap();
     let own = |words: &String| words.strip_prefix("log.csv: ").map(str::to_owned).unwrap();
     (names, table.columns, table.words.iter().map(own).collect())
 }

@@ -31,7 +31,7 @@ fn opened(origin: impl Read + Send + 'static, options: &Options) -> TextReader {
 }
 
 fn streamed(origin: impl Read + Send + 'static, options: &Options, whole_lines: bool) -> TextStream {
-    let selection = Selection { columns: vec![1, 0], time: None };
+    let selection = Selection { columns: vec![1, 0], time: None, date: None };
     opened(origin, options).stream(&selection, whole_lines, None).unwrap()
 }
 
@@ -100,7 +100,8 @@ fn a_header_waits_for_its_first_row_only() {
     // The pipe stays open: whoever asks for more than the first row waits for ever.
     let reader = opened(Pipe { pieces, rest: Cursor::default() }, &options);
     assert_eq!(reader.names(), ["u", "y"]);
-    let mut stream = reader.stream(&Selection { columns: vec![0, 1], time: None }, false, None).unwrap();
+    let mut stream =
+        reader.stream(&Selection { columns: vec![0, 1], time: None, date: None }, false, None).unwrap();
     assert!(matches!(stream.next().unwrap(), Event::Row));
     assert_eq!((stream.values(), stream.line()), (&[1.0, 2.0][..], 5));
     drop(write);
@@ -159,7 +160,7 @@ fn a_stream_can_be_ended_from_outside() {
 #[test]
 fn times_are_those_of_a_whole_log() {
     let text = "t,y\n2024-03-01T12:00:00Z,1\n2024-03-01T12:00:00.5Z,2\n,3\n";
-    let selection = Selection { columns: vec![1], time: Some(0) };
+    let selection = Selection { columns: vec![1], time: Some(0), date: None };
     let mut stream = opened(Cursor::new(text), &plain()).stream(&selection, false, None).unwrap();
     let mut times = Vec::new();
     loop {

@@ -121,6 +121,7 @@ impl LogJob {
             encoding: encoding.transpose()?,
             time_format: clock.time_format.clone(),
             time_unit: clock.time_unit.as_deref().map(unit).transpose()?,
+            time_zone: clock.time_zone.clone(),
             bound: None,
         };
         options.check().map_err(Failure::usage)?;
@@ -152,6 +153,7 @@ impl LogJob {
             time: clock.time.clone(),
             time_format: clock.time_format.clone(),
             time_unit: clock.time_unit.clone(),
+            time_zone: None,
             sample_time: sample_time.filter(|_| clock.time.is_none()),
             resample: None,
         };
@@ -229,7 +231,7 @@ fn refused(option: &str, error: &thetahat::Error) -> Failure {
 fn resampling(text: &str) -> Result<Resample, Failure> {
     let wrong = || {
         Failure::usage(format!(
-            "--resample {text}: write it as STEP:hold or STEP:linear, such as 0.5:linear; with :unfiltered after it without \
+            "--resample {text}: write it as STEP:hold, STEP:linear or STEP:auto, such as 0.5:linear; with :unfiltered after it without \
              a filter"
         ))
     };
@@ -241,6 +243,7 @@ fn resampling(text: &str) -> Result<Resample, Failure> {
     let interpolation = match how {
         "hold" => Interpolation::Hold,
         "linear" => Interpolation::Linear,
+        "auto" => Interpolation::Auto,
         _ => return Err(wrong()),
     };
     Ok(Resample { step: step.parse().map_err(|_| wrong())?, interpolation, anti_alias })

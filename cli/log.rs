@@ -4,15 +4,15 @@ use std::collections::{HashMap, HashSet};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use thetahat::data::{Channel, Log, Recording, Resampling, Rows, Source, Times};
+use thetahat::data::{Calendar, Channel, Log, Recording, Resample, Resampling, Rows, Source, Times, mended};
 use thetahat::model::{GreyBox, Model};
 use thetahat::{Error, text};
 use thetahat_table::{Bound, ClockColumns, Lines, Options, Reader, Selection, Stream, Table};
 
 use crate::failure::Failure;
 use crate::interrupt;
-use crate::messages::note;
 use crate::job::{Clock, LogJob};
+use crate::messages;
 use crate::progress::Reading;
 
 /// A log and where it came from, its rows counted from 1.
@@ -105,19 +105,61 @@ pub(crate) fn load(
     clocks: Clocks,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
-    let Columns { channels, table, mut source, clock, words } =
-        columns(path, job, |reader| choose(reader.names()))?;
+    let Columns { channels, table, mut source, clock, restarts, mut words } =
+        columns(path, job, false, |reader| choose(reader.names()))?;
     let file = source.file.clone();
-    let log = match (&clock, table.time) {
-        (Clock::Column { resample: Some(how), .. }, Some(time)) => {
-            source.resampled = Some(Resampling::new(how, &time).map_err(at_line(&file, &table.lines))?);
-            Log::resampled(channels, &time, how)
-        }
+    // The times up to where the clock begins again.
+    let first = || {
+        let time = table.time.as_deref()?;
+        Some(restarts.first().map_or(time, |end| &time[..*end]))
+    };
+    let mut how = clock.resample();
+    if let (None, false, Some(time)) = (how, clocks.any, first()) {
+        how = Resample::for_two_rates(time).map_err(at_line(&file, &table.lines))?;
+        words.extend(how.map(|how| {
+            format!(
+                "{file}: the log has two rates, and what it is used for needs one: it is resampled every {} s, channels that move in \
+                 steps by hold, the others by straight lines; --resample says otherwise",
+                how.step
+            )
+        }));
+    }
+    let one = |channels: Vec<Channel>, time: Option<Vec<f64>>| match (how, time) {
+        (Some(how), Some(time)) => Log::resampled(channels, &time, &how),
         (_, time) => made(channels, time, &clock, clocks),
+    };
+    if let (Some(how), Some(time)) = (how, first()) {
+        source.resampled = Some(Resampling::new(&how, time).map_err(at_line(&file, &table.lines))?);
+    }
+    let log = match (restarts.as_slice(), table.time) {
+        ([_, ..], Some(time)) => Log::join(
+            cut(channels, &time, &restarts)
+                .map(|(channels, time)| one(channels, Some(time)))
+                .collect::<Result<_, _>>()
+                .map_err(at_line(&file, &table.lines))?,
+        ),
+        (_, time) => one(channels, time),
     };
     let log = log.map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
     Ok(Loaded { log, source, words })
+}
+
+/// The parts of a log that begin at these rows, and the one before.
+fn cut<'l>(
+    channels: Vec<Channel>,
+    time: &'l [f64],
+    starts: &'l [usize],
+) -> impl Iterator<Item = (Vec<Channel>, Vec<f64>)> + 'l {
+    let firsts = std::iter::once(0).chain(starts.iter().copied());
+    let ends = starts.iter().copied().chain([time.len()]);
+    firsts.zip(ends).map(move |(first, end)| {
+        let part = |channel: &Channel| Channel {
+            name: channel.name.clone(),
+            values: channel.values[first..end].to_vec(),
+        };
+        (channels.iter().map(part).collect(), time[first..end].to_vec())
+    })
 }
 
 /// The values of a part are at most so many, or a few more.
@@ -193,7 +235,7 @@ pub(crate) fn in_parts<T>(
     let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let (names, lags, chosen) = choose(&reader)?;
-    let Selected { selection, clock, mut words } = selected(&reader, &file, job, &names)?;
+    let Selected { selection, clock, note, mut words } = selected(&reader, &file, job, &names)?;
     let most = (PART / (names.len() + 1)).max(2 * lags);
     let mut before = Before { file: &file, names: &names, clock, lags, rows: 0, tail: Tail::default() };
     let mut waiting: Option<Table> = None;
@@ -229,6 +271,7 @@ pub(crate) fn in_parts<T>(
     if let Some(last) = waiting {
         take(&chosen, before.with(last)?)?;
     }
+    note.iter().for_each(|note| messages::note(note));
     Ok(words)
 }
 
@@ -311,9 +354,21 @@ pub(crate) fn record(
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Recorded, Failure> {
-    let Columns { channels, table, source, clock, words } = columns(path, job, choose)?;
-    let times = times(&clock, table.time);
+    let Columns { channels, table, source, clock, restarts, words } = columns(path, job, true, choose)?;
+    let time = table.time.map(|time| after_pauses(time, &restarts));
+    let times = times(&clock, time);
     Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
+}
+
+/// The times of experiments, each after a pause that is a gap to whoever looks at the clock.
+fn after_pauses(mut time: Vec<f64>, starts: &[usize]) -> Vec<f64> {
+    const PAUSE: f64 = 10.0;
+    for &start in starts {
+        let step = time[start - 1] - start.checked_sub(2).map_or(time[start - 1], |row| time[row]);
+        let ahead = time[start - 1] + PAUSE * step - time[start];
+        time[start..].iter_mut().for_each(|time| *time += ahead);
+    }
+    time
 }
 
 /// When the rows were recorded: one a second without a clock.
@@ -348,9 +403,9 @@ pub(crate) fn follow(
         _ => job,
     };
     let Selected { selection, mut words, .. } = selected(&reader, &file, live, &names)?;
-    words.extend(hint.map(|name| {
-        format!("{file}: column '{name}' looks like a clock; --time {name} would use it")
-    }));
+    words.extend(
+        hint.map(|name| format!("{file}: column '{name}' looks like a clock; --time {name} would use it")),
+    );
     let stream = reader.stream(&selection, whole_lines, start)?;
     interrupt::follows(stream.waker());
     Ok((stream, words))
@@ -374,31 +429,60 @@ struct Columns {
     /// Where they came from, the rows as they stand there.
     source: Source,
     clock: Clock,
+    /// The rows (from 0) at which the clock begins again.
+    restarts: Vec<usize>,
     /// What the reader should know, in plain words.
     words: Vec<String>,
 }
 
+/// Reads the columns that `choose` names. `any_order` is whether a clock that stands still or goes back will do.
 fn columns(
     path: &Path,
     job: &LogJob,
+    any_order: bool,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Columns, Failure> {
     let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
     let names = choose(&reader)?;
-    let Selected { selection, clock, mut words } = selected(&reader, &file, job, &names)?;
+    let Selected { selection, clock, note, mut words } = selected(&reader, &file, job, &names)?;
 
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
     let mut table = reader.read(&selection, &mut update)?;
     drop(progress);
     words.append(&mut table.words);
+    let mut restarts = Vec::new();
+    if let Some(time) = table.time.take() {
+        let kept = any_order.then(|| time.clone());
+        match (mended(time, calendar(table.calendar)), kept) {
+            (Ok(mended), _) => {
+                words.extend(mended.words.iter().map(|words| format!("{file}: {words}")));
+                (table.time, restarts) = (Some(mended.time), mended.restarts);
+            }
+            (Err(_), Some(time)) => table.time = Some(time),
+            (Err(error), None) => return Err(at_line(&file, &table.lines)(error)),
+        }
+    }
+
+    note.iter().for_each(|note| messages::note(note));
 
     let values = std::mem::take(&mut table.columns);
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
     let source = Source { file, rows, time: clock.column(), start: table.start.take(), resampled: None };
-    Ok(Columns { channels, table, source, clock, words })
+    Ok(Columns { channels, table, source, clock, restarts, words })
+}
+
+/// What the times of a table are, to the library.
+fn calendar(of: thetahat_table::Calendar) -> Calendar {
+    match of {
+        thetahat_table::Calendar::None => Calendar::None,
+        thetahat_table::Calendar::TimesOfDay => Calendar::TimesOfDay,
+        thetahat_table::Calendar::Wall { first } => Calendar::Wall { first: first as f64 / 1e9 },
+        thetahat_table::Calendar::Instants => Calendar::Instants,
+        thetahat_table::Calendar::Zone => Calendar::Zone,
+    }
 }
 
 /// How a log is written, and as much memory as there is now: other logs may be in memory already.
@@ -411,6 +495,8 @@ struct Selected {
     selection: Selection,
     /// Where the times come from: not left to the log any more, unless it has no clock.
     clock: Clock,
+    /// Which clock was taken, if none was named.
+    note: Option<String>,
     /// What the reader should know, in plain words.
     words: Vec<String>,
 }
@@ -420,6 +506,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();
     let columns = find_all(names, header).map_err(bad)?;
+    let mut taken = None;
     let (clock, found) = match &job.clock {
         Clock::Unknown { resample } => {
             let found = free_clocks(reader, &columns);
@@ -431,15 +518,15 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
             let clock = match (found, resample) {
                 (Some(found), resample) => {
                     let name = called(found, header);
-                    if !job.quiet {
-                        note(&format!(
-                            "{file}: the clock is column '{name}'; --time names another, --sample-time counts rows"
-                        ));
-                    }
+                    taken = Some(format!(
+                        "{file}: the clock is column '{name}'; --time names another, --sample-time says that rows are evenly apart"
+                    ));
                     Clock::Column { name, resample: *resample }
                 }
                 (None, Some(_)) => {
-                    return Err(bad("no column is a clock, and --resample needs one; name it with --time".to_owned()));
+                    return Err(bad(
+                        "no column is a clock, and --resample needs one; name it with --time".to_owned()
+                    ));
                 }
                 (None, None) => job.clock.clone(),
             };
@@ -448,9 +535,10 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
         Clock::Column { name, .. } => (job.clock.clone(), Some(named_clock(name, header).map_err(bad)?)),
         Clock::Fixed(_) => (job.clock.clone(), None),
     };
-    let mut taken: HashSet<usize> = found.iter().flat_map(|found| [Some(found.time), found.date]).flatten().collect();
+    let mut roles: HashSet<usize> =
+        found.iter().flat_map(|found| [Some(found.time), found.date]).flatten().collect();
     for &column in &columns {
-        if !taken.insert(column) {
+        if !roles.insert(column) {
             return Err(Failure::usage(format!(
                 "column '{}' is named twice; each has one role",
                 header[column]
@@ -458,7 +546,12 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
         }
     }
     let (time, date) = found.map_or((None, None), |found| (Some(found.time), found.date));
-    Ok(Selected { selection: Selection { columns, time, date }, clock, words: Vec::new() })
+    Ok(Selected {
+        selection: Selection { columns, time, date },
+        clock,
+        note: taken.filter(|_| !job.quiet),
+        words: Vec::new(),
+    })
 }
 
 /// The columns that are the clock of a log, or may be it.
@@ -479,7 +572,9 @@ fn free_clocks(reader: &Reader, columns: &[usize]) -> Vec<ClockColumns> {
 
 /// The columns of a clock: the one of this name, or two with a comma between their names, of dates and of times of day.
 fn named_clock(name: &str, header: &[String]) -> Result<ClockColumns, String> {
-    let pair = thetahat_table::names(name).ok().filter(|pair| pair.len() == 2 && !header.iter().any(|own| own == name));
+    let pair = thetahat_table::names(name)
+        .ok()
+        .filter(|pair| pair.len() == 2 && !header.iter().any(|own| own == name));
     match pair.as_deref() {
         Some([date, time]) => Ok(ClockColumns { time: find(time, header)?, date: Some(find(date, header)?) }),
         _ => Ok(ClockColumns { time: find(name, header)?, date: None }),

@@ -60,8 +60,31 @@ fn dates_and_sample_times_say_the_same_as_seconds() {
         (
             written(|time| format!("01.03.2024 12:{}", minutes_and_seconds(time))),
             "--time time --time-format '%d.%m.%Y %H:%M:%S%.f'",
-            json!("01.03.2024 12:01:40.00"),
+            json!("2024-03-01T12:01:40"),
         ),
+        (
+            written(|time| format!("01.03.2024 12:{}", minutes_and_seconds(time))),
+            "",
+            json!("2024-03-01T12:01:40"),
+        ),
+        (
+            written(|time| format!("2024/03/01 12:{}", minutes_and_seconds(time))),
+            "",
+            json!("2024-03-01T12:01:40"),
+        ),
+        (
+            written(|time| format!("01.03.2024,12:{}", minutes_and_seconds(time))).replacen(
+                "time",
+                "day,time of day",
+                1,
+            ),
+            "",
+            json!("2024-03-01T12:01:40"),
+        ),
+        (written(|time| ((time + 1_709_294_400.0) * 1000.0).to_string()), "", json!("2024-03-01T12:01:40Z")),
+        (written(|time| (time * 1000.0).to_string()).replacen("time", "time [ms]", 1), "", Value::Null),
+        (written(|time| (time * 1e6).to_string()).replacen("time", "TimeUS", 1), "", Value::Null),
+        (written(|time| (time / 60.0).to_string()), "--time-unit min", Value::Null),
         (
             written(|time| format!("12:{}", minutes_and_seconds(time))),
             "--time time --time-format %H:%M:%S%.f",
@@ -96,12 +119,32 @@ fn without_a_clock_rows_are_counted() {
 }
 
 #[test]
-fn a_column_that_looks_like_a_clock_is_pointed_out() {
+fn the_one_column_that_is_a_clock_is_taken() {
     let folder = Folder::with_log(written(|time| time.to_string()));
     let run = folder.done("fit log.csv --na 2 --nb 2");
-    assert_eq!(run.stderr.lines().count(), 1);
-    assert!(run.stderr.starts_with("warning: ") && run.stderr.contains("--time time"), "{}", run.stderr);
+    assert_eq!(
+        run.stderr,
+        "note: log.csv: the clock is column 'time'; --time names another, --sample-time says that rows are evenly apart\n"
+    );
+    let report = |options: &str| folder.fit(&format!("log.csv {options} --na 2 --nb 2"));
+    assert_eq!(report(""), report("--time time"));
     assert_eq!(folder.done("fit log.csv --sample-time 2 --na 2 --nb 2").stderr, "");
+    // It is resampled without its name, too.
+    assert_eq!(report("--resample 0.5:hold"), report("--time time --resample 0.5:hold"));
+    // A column that is used otherwise is none.
+    assert_eq!(number(&report("-u time"), "/model/sample_time"), 1.0);
+    // Of two nobody knows which.
+    folder.write(
+        "log.csv",
+        written(|time| format!("{time},{}", time + 5.0)).replacen("time", "time,timestamp", 1),
+    );
+    let refusal = folder.refused("fit log.csv --na 2 --nb 2", 3);
+    assert!(
+        refusal.contains("several columns may be the clock: 'time', 'timestamp'; name one with --time"),
+        "{refusal}"
+    );
+    folder.done("fit log.csv --na 2 --nb 2 --time timestamp");
+    folder.done("fit log.csv --na 2 --nb 2 --sample-time 1");
 }
 
 #[test]
@@ -272,8 +315,6 @@ fn options_of_the_clock_that_exclude_or_need_each_other() {
     let folder = Folder::with_log(written(|time| time.to_string()));
     for options in [
         "--time time --sample-time 1",
-        "--resample 1:hold",
-        "--time-format %s",
         // The sample time does not make up for the column of times.
         "--sample-time 1 --resample 2:hold",
         "--sample-time 1 --time-format %s",

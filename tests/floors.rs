@@ -63,9 +63,13 @@ const LIBRARY: House = House {
 const TABLE: House = House {
     source: "crates/thetahat-table/src",
     floors: &[
-        &["decimal", "error", "lines", "memory", "record"],
+        &["blanks", "decimal", "error", "lines", "memory", "record", "words"],
         &["dialect", "mailbox", "number", "source"],
-        &["block", "layout", "names", "time"],
+        &["block", "names", "time"],
+        &["names_of_times", "zone"],
+        &["clock"],
+        &["shape"],
+        &["layout"],
         &["columnar", "rows"],
         &["stream"],
         &["reader"],

@@ -259,11 +259,13 @@ fn other_inputs_and_outputs() {
     assert_eq!(document["excitation"][1]["same_as"], "u1");
     folder.write("log.csv", csv(&[("u", &u), ("y", &[3.0; 200])]));
     assert_eq!(inspected(&folder, "log.csv")["command"], Value::Null);
-    // A column that looks like a clock is one among others, and pointed out.
+    // A clock is no channel.
     folder.write("log.csv", Experiment::new(50).timed(&(0..50).map(f64::from).collect::<Vec<_>>()));
-    let document = inspected(&folder, "log.csv");
-    assert_eq!(document["channels"].as_array().map(Vec::len), Some(3));
-    assert!(says(&document, "--time time would use it"));
+    let run = folder.done("inspect log.csv --format json");
+    assert!(run.stderr.contains("the clock is column 'time'"), "{}", run.stderr);
+    let document: Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(document["channels"].as_array().map(Vec::len), Some(2));
+    assert!(document["command"].as_str().is_some_and(|command| command.contains("--time time")));
     // From standard input.
     let run = folder.run_on("inspect - --format json", plain_log());
     assert_eq!(run.code, 0, "{}", run.stderr);

@@ -65,3 +65,4 @@ mod transient;
 mod tune;
 mod validate;
 mod width;
+mod written_logs;

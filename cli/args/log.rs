@@ -102,14 +102,17 @@ pub(crate) struct ClockArguments {
     /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times, else s]
     #[arg(long, value_name = "UNIT", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_unit: Option<String>,
+    /// The time zone of dates without one, such as Europe/Berlin, for logs in which clocks are set
+    #[arg(long, value_name = "ZONE", conflicts_with = "sample_time", help_heading = "Clock")]
+    pub(crate) time_zone: Option<String>,
     /// Seconds from one row to the next [default: by the clock; without one 1, so that times count rows]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
-    /// Put a log on another clock: a step in seconds, and how values between samples are read. A step of two recorded ones or
+    /// Put a log on another clock: a step in seconds, and how values between samples are read; auto holds channels that move in steps. A step of two recorded ones or
     /// more is filtered against aliasing first, unless :unfiltered is added or the clock is irregular
     #[arg(
         long,
-        value_name = "STEP:hold|linear[:unfiltered]",
+        value_name = "STEP:hold|linear|auto[:unfiltered]",
         allow_hyphen_values = true,
         help_heading = "Clock"
     )]

@@ -86,6 +86,20 @@ fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
 }
 
 impl Resolved {
+    /// The same without a word on how a log is read: with many logs there would be as many.
+    fn quiet(mut self) -> Self {
+        let log = match &mut self {
+            Self::GreyBox(job) => &mut job.log,
+            Self::Narx(job) => &mut job.log,
+            Self::Process(job) => &mut job.log,
+            Self::StateSpace(job) => &mut job.log,
+            Self::Pieces(job) => job.log(),
+            Self::Polynomial { job, .. } => &mut job.log,
+        };
+        log.quiet = true;
+        self
+    }
+
     /// Reads the logs and fits the model.
     fn found(&self, telling: &Telling) -> Result<Identified, Failure> {
         match self {
@@ -127,7 +141,7 @@ fn of_many(arguments: &FitArguments) -> Result<String, Failure> {
 fn one(arguments: &FitArguments, log: &Path) -> Result<Done, Failure> {
     let own = FitArguments { logs: vec![log.to_owned()], ..arguments.clone() };
     let telling = Telling::Kept(RefCell::default());
-    let Identified { report, .. } = resolved(&own)?.found(&telling)?;
+    let Identified { report, .. } = resolved(&own)?.quiet().found(&telling)?;
     Done::new(&report, report.row(), telling.kept(), &report.warnings)
 }
 

@@ -59,7 +59,9 @@ fn of_log(arguments: &InspectArguments, log: &Path) -> InspectArguments {
 /// Inspects one log of many.
 fn one(arguments: &InspectArguments, log: &Path) -> Result<Done, Failure> {
     let own = of_log(arguments, log);
-    let (inspection, _) = inspected(&InspectJob::resolve(&own)?, &own)?;
+    let mut job = InspectJob::resolve(&own)?;
+    job.log.quiet = true;
+    let (inspection, _) = inspected(&job, &own)?;
     Done::new(&inspection, inspection.row(), Vec::new(), &inspection.warnings)
 }
 

@@ -48,6 +48,15 @@ impl PiecesJob {
         }
     }
 
+    /// How the logs are read.
+    pub(super) fn log(&mut self) -> &mut LogJob {
+        match self {
+            Self::Linear(job) => &mut job.log,
+            Self::StateSpace(job) => &mut job.log,
+            Self::NonlinearArx(job) => &mut job.log,
+        }
+    }
+
     fn wanted(&self) -> Wanted<'_> {
         match self {
             Self::Linear(job) => wanted(job),

@@ -23,6 +23,7 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
     let evaluation = &arguments.evaluation;
     let read = [std::slice::from_ref(&arguments.report), &arguments.logs].concat();
     let mut job = EvaluationJob::resolve(evaluation, &read)?;
+    job.log.quiet = arguments.each.each;
     let requirements = job.requirements(&arguments.require)?;
     let log = (!arguments.each.each).then(|| only("validate", &arguments.logs)).transpose()?;
     let report = stored::report(&arguments.report)?;

@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use thetahat::data::Interpolation;
 use thetahat::inspect::Inspection;
 
 use super::{Clock, LogJob, only};
@@ -59,6 +60,8 @@ impl InspectJob {
                 let clock = &inspection.clock;
                 match (&arguments.clock.resample, &inspection.log.resampled) {
                     (Some(asked), _) => option("--resample", asked),
+                    // A fit puts a log of two rates on this clock by itself.
+                    (None, Some(done)) if done.interpolation == Interpolation::Auto => {}
                     (None, Some(done)) => option("--resample", &format!("{}:linear", done.step)),
                     (None, None) if clock.irregular => return None,
                     (None, None) => {}
@@ -71,6 +74,9 @@ impl InspectJob {
         }
         if let Some(unit) = &arguments.clock.time_unit {
             option("--time-unit", unit);
+        }
+        if let Some(zone) = &arguments.clock.time_zone {
+            option("--time-zone", zone);
         }
         let idle = |name: &str| {
             let mut excitations = inspection.excitation.iter();

@@ -54,6 +54,7 @@ impl StepArguments {
             ("time", clock.time.is_some()),
             ("time-format", clock.time_format.is_some()),
             ("time-unit", clock.time_unit.is_some()),
+            ("time-zone", clock.time_zone.is_some()),
             ("sample-time", clock.sample_time.is_some()),
             ("resample", clock.resample.is_some()),
             ("delimiter", log.delimiter.is_some()),

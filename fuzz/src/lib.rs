@@ -54,9 +54,11 @@ pub fn table(bytes: &[u8]) {
 fn read(path: &Path, options: &Options) {
     let Ok(reader) = Reader::open(path, options) else { return };
     let words = reader.words();
-    let time = reader.times().first().copied().or((words.len() > 1).then_some(0));
-    let columns = (0..words.len()).filter(|column| Some(*column) != time && !words[*column]);
-    let selection = Selection { columns: columns.take(8).collect(), time };
+    let clock = reader.times().first().copied();
+    let time = clock.map(|clock| clock.time).or((words.len() > 1).then_some(0));
+    let date = clock.and_then(|clock| clock.date);
+    let columns = (0..words.len()).filter(|column| ![time, date].contains(&Some(*column)) && !words[*column]);
+    let selection = Selection { columns: columns.take(8).collect(), time, date };
     drop(reader.read(&selection, &mut |_, _| {}));
     if let Ok(reader) = Reader::open(path, options) {
         drop(reader.read_parts(&selection, Some(7), &mut |_, _| {}, &mut |_| ControlFlow::Continue(())));

@@ -65,9 +65,10 @@ impl Log {
                 let interpolation = match how.as_str() {
                     "hold" => Interpolation::Hold,
                     "linear" => Interpolation::Linear,
+                    "auto" => Interpolation::Auto,
                     _ => {
                         return Err(PyValueError::new_err(format!(
-                            "resample: '{how}' is neither 'hold' nor 'linear'"
+                            "resample: '{how}' is none of 'hold', 'linear' and 'auto'"
                         )));
                     }
                 };

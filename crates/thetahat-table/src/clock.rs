@@ -2,7 +2,7 @@
 
 use jiff::Timestamp;
 
-use super::time::{self, Unit};
+use super::time::{self, Unit, Written};
 use super::{Options, names_of_times};
 
 /// The instants of logs: from 2000 to 2100, in seconds since 1970.
@@ -24,17 +24,6 @@ pub(super) struct Sample {
     pub(super) numbers: Vec<f64>,
     /// The same, if they are dates or times of day.
     pub(super) dates: Vec<String>,
-}
-
-/// How the times of a column are written.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Written {
-    /// Numbers in a unit, as they are.
-    Numbers(Unit),
-    /// Numbers that count from a day: so many nanoseconds after it was 1970.
-    Since(Unit, i128),
-    /// ISO 8601, or a format in the manner of strptime.
-    Dates(Option<String>),
 }
 
 /// How the times of a column are written, and what the reader should know of that.

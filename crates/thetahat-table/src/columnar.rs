@@ -25,6 +25,7 @@ use super::error::{Error, escaped, shortened};
 use super::lines::Lines;
 use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::source::{Bytes, Format};
+use super::time::Calendar;
 use super::{Header, Options, Selection, Table};
 use batches::{Batches, Opened};
 use clock::Clock;
@@ -376,6 +377,7 @@ impl Conversion {
             columns: selection.columns.iter().map(&mut take).collect(),
             time: selection.time.as_ref().map(take),
             start: self.clock.as_ref().and_then(|clock| clock.start.clone()),
+            calendar: Calendar::None,
             rows: part.rows,
             lines: Lines::default(),
             words: part.words,

@@ -8,13 +8,21 @@ use super::mailbox::{Event, Waker};
 use super::reader::{SIZES, TextReader};
 use super::source::{Bytes, Source};
 use super::stream::TextStream;
+use super::time::Calendar;
+use super::zone::Zone;
 use super::{ClockColumns, Options, Selection, Table};
 
 #[cfg(feature = "columnar")]
 use super::columnar::{ColumnarReader, ColumnarStream};
 
 /// A log whose columns are known and whose rows are still to be read.
-pub struct Reader(pub(super) AnyReader);
+pub struct Reader {
+    any: AnyReader,
+    /// The name that messages give the log.
+    file: String,
+    /// That of dates without a zone.
+    zone: Option<Zone>,
+}
 
 pub(super) enum AnyReader {
     Text(Box<TextReader>),
@@ -41,11 +49,13 @@ impl Reader {
     ) -> Result<Self, Error> {
         options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
         let bytes = Bytes::open(path)?;
-        match bytes.format {
-            None => Ok(Self(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?)))),
+        let file = bytes.name().to_owned();
+        let zone = options.time_zone.as_deref().and_then(|name| Zone::of(name).ok());
+        let any = match bytes.format {
+            None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?))),
             #[cfg(feature = "columnar")]
             Some(format) => {
-                Ok(Self(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?))))
+                Ok(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?)))
             }
             #[cfg(not(feature = "columnar"))]
             Some(_) => Err(Error::data(
@@ -54,12 +64,19 @@ impl Reader {
                 "is a Parquet or Arrow file, which this program was built without; build it with the feature columnar, or \
                  write CSV",
             )),
-        }
+        };
+        Ok(Self { any: any?, file, zone })
+    }
+
+    /// A text in any stream.
+    #[cfg(test)]
+    pub(super) fn of_text(reader: TextReader) -> Self {
+        Self { any: AnyReader::Text(Box::new(reader)), file: String::new(), zone: None }
     }
 
     /// The names of the columns, as they are in the header; without one they are numbered from `1`.
     pub fn names(&self) -> &[String] {
-        match &self.0 {
+        match &self.any {
             AnyReader::Text(reader) => reader.names(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.names(),
@@ -69,7 +86,7 @@ impl Reader {
     /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
     /// is a number, and not all are missing.
     pub fn words(&self) -> Vec<bool> {
-        match &self.0 {
+        match &self.any {
             AnyReader::Text(reader) => reader.words(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.words(),
@@ -78,7 +95,7 @@ impl Reader {
 
     /// The columns of which the name is not UTF-8 and cannot be shown.
     pub fn nameless(&self) -> Vec<usize> {
-        match &self.0 {
+        match &self.any {
             AnyReader::Text(reader) => reader.nameless().collect(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(_) => Vec::new(),
@@ -87,7 +104,7 @@ impl Reader {
 
     /// The columns that are clocks by their type, or in a text by their names and their first values.
     pub fn times(&self) -> Vec<ClockColumns> {
-        match &self.0 {
+        match &self.any {
             AnyReader::Text(reader) => reader.times(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => {
@@ -122,11 +139,25 @@ impl Reader {
         progress: &mut dyn FnMut(u64, Option<u64>),
         take: &mut dyn FnMut(Table) -> ControlFlow<()>,
     ) -> Result<(), Error> {
-        match self.0 {
-            AnyReader::Text(reader) => reader.read_parts(selection, most, progress, take),
+        let Self { any, file, zone } = self;
+        // What cannot be read in the zone ends the reading.
+        let mut failed = None;
+        let mut take = |mut table: Table| {
+            table.calendar = Calendar::of(table.start.as_deref());
+            match zone.as_ref().map_or(Ok(()), |zone| zone.apply(&file, &mut table)) {
+                Ok(()) => take(table),
+                Err(error) => {
+                    failed = Some(error);
+                    ControlFlow::Break(())
+                }
+            }
+        };
+        let read = match any {
+            AnyReader::Text(reader) => reader.read_parts(selection, most, progress, &mut take),
             #[cfg(feature = "columnar")]
-            AnyReader::Columnar(reader) => reader.read_parts(selection, most, progress, take),
-        }
+            AnyReader::Columnar(reader) => reader.read_parts(selection, most, progress, &mut take),
+        };
+        read.and(failed.map_or(Ok(()), Err))
     }
 
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
@@ -138,7 +169,7 @@ impl Reader {
         whole_lines: bool,
         start: Option<&str>,
     ) -> Result<Stream, Error> {
-        match self.0 {
+        match self.any {
             AnyReader::Text(reader) => {
                 Ok(Stream(AnyStream::Text(Box::new(reader.stream(selection, whole_lines, start)?))))
             }

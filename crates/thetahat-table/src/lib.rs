@@ -64,6 +64,7 @@ mod stream;
 mod tests;
 mod time;
 mod words;
+mod zone;
 
 pub use error::{Error, ErrorKind, remedy};
 pub use formats::{Reader, Stream};
@@ -71,7 +72,7 @@ pub use lines::Lines;
 pub use mailbox::{Event, Waker};
 pub use memory::Bound;
 pub use names::{list, names};
-pub use time::Unit;
+pub use time::{Calendar, Unit};
 
 /// Where a log has the names of its columns.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -107,6 +108,8 @@ pub struct Options {
     pub encoding: Option<&'static encoding_rs::Encoding>,
     /// How times are written, in the manner of strptime; recognised from the first rows if it is not given.
     pub time_format: Option<String>,
+    /// The time zone of dates that have none of their own, such as Europe/Berlin.
+    pub time_zone: Option<String>,
     /// The unit of times that are numbers; by their name and their size if it is not given, else seconds.
     pub time_unit: Option<Unit>,
     /// What memory there is for; times count as values, too.
@@ -135,7 +138,7 @@ impl Options {
                 Err("a comma cannot be both the delimiter and the decimal comma; separate fields by ;"
                     .to_owned())
             }
-            _ => Ok(()),
+            _ => self.time_zone.as_deref().map_or(Ok(()), |name| zone::Zone::of(name).map(drop)),
         }
     }
 }
@@ -183,6 +186,8 @@ pub struct Table {
     pub time: Option<Vec<f64>>,
     /// The first time in ISO 8601, if it is a date.
     pub start: Option<String>,
+    /// What the times are besides seconds.
+    pub calendar: Calendar,
     /// The number of rows.
     pub rows: usize,
     /// The line on which each row is; nothing where there are no lines.

@@ -20,7 +20,7 @@ use super::layout::{Layout, Row};
 use super::lines::Lines;
 use super::number::Numbers;
 use super::record::Record;
-use super::time::{Clock, Times};
+use super::time::{Calendar, Clock, Times};
 use super::words::{self, States, Tally};
 use super::{Selection, Table};
 
@@ -144,6 +144,7 @@ impl Plan {
                 times
             }),
             start,
+            calendar: Calendar::None,
             rows: rows.count,
             lines: rows.lines,
             words: Vec::new(),

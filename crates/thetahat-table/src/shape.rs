@@ -442,9 +442,6 @@ fn most_consistent(text: &[u8], first: (usize, u64), options: &Options, numbers:
     if best.delimiter == b',' && lines.is_one_column_of_decimal_commas() {
         return dialect(b';', false);
     }
-    if best.delimiter == b'\t' && most > 0 {
-        return best;
-    }
     let separated = blanks::separated(text);
     let by_blanks = Lines::read(&separated, first, dialect(b'\t', true), numbers, LINES);
     if by_blanks.width().0 >= most && by_blanks.rows_of_values() > lines.rows_of_values() {

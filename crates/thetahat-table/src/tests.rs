@@ -7,7 +7,6 @@ use encoding_rs::{Encoding, UTF_16LE, WINDOWS_1252};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::formats::AnyReader;
 use super::reader::{SIZES, Sizes, TextReader};
 use super::source::{Bytes, Source};
 use super::*;
@@ -22,7 +21,7 @@ const TINY: [(usize, usize); 6] = [(1, 1), (2, 1), (7, 3), (16, 5), (64, 16), (1
 impl TextReader {
     /// Behind the front of all formats.
     fn read(self, selection: &Selection, progress: &mut dyn FnMut(u64, Option<u64>)) -> Result<Table, Error> {
-        Reader(AnyReader::Text(Box::new(self))).read(selection, progress)
+        Reader::of_text(self).read(selection, progress)
     }
 }
 

@@ -5,7 +5,6 @@ use jiff::fmt::strtime::BrokenDownTime;
 use jiff::fmt::temporal::Pieces;
 use jiff::tz::Offset;
 
-use super::clock::Written;
 use super::error::{escaped, quoted};
 use super::number::Numbers;
 
@@ -134,6 +133,54 @@ pub(super) enum Clock {
         /// The first one.
         first: Timestamp,
     },
+}
+
+/// How the times of a column are written.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Written {
+    /// Numbers in a unit, as they are.
+    Numbers(Unit),
+    /// Numbers that count from a day: so many nanoseconds after it was 1970.
+    Since(Unit, i128),
+    /// ISO 8601, or a format in the manner of strptime.
+    Dates(Option<String>),
+}
+
+/// What times are, besides seconds.
+#[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
+pub enum Calendar {
+    /// Numbers.
+    #[default]
+    None,
+    /// Times of day, of any day.
+    TimesOfDay,
+    /// Dates as the clocks on a wall show them.
+    Wall {
+        /// The first one, in nanoseconds since these clocks showed the beginning of 1970.
+        first: i64,
+    },
+    /// Instants.
+    Instants,
+    /// Instants of a zone in which the hour that comes twice in autumn was read as the first of both.
+    Zone,
+}
+
+impl Calendar {
+    /// That of times of which this is the first.
+    pub(super) fn of(start: Option<&str>) -> Self {
+        let Some(start) = start else { return Self::None };
+        let has_zone = |pieces: &Pieces<'_>| {
+            pieces.to_numeric_offset().is_some() || pieces.time_zone_annotation().is_some()
+        };
+        match (Pieces::parse(start.as_bytes()), instant(start.as_bytes(), None)) {
+            (Ok(pieces), Ok(_)) if has_zone(&pieces) => Self::Instants,
+            // Years beyond 2262 have clocks that nobody sets.
+            (Ok(_), Ok(first)) => {
+                i64::try_from(first.as_nanosecond()).map_or(Self::Instants, |first| Self::Wall { first })
+            }
+            _ => Self::TimesOfDay,
+        }
+    }
 }
 
 /// The times of a log, of one column or of two.
@@ -274,6 +321,9 @@ impl Clock {
         }
     }
 }
+
+/// The message for a time that no calendar has.
+pub(super) const NO_DATE: &str = "the time is no date between the years -9999 and 9999; correct it";
 
 /// The message for a time that is not there.
 pub(super) const MISSING: &str = "the time is missing; fill it in, or take the row out";

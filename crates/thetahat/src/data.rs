@@ -4,6 +4,7 @@
 //!   each row. A missing value is NaN. [`Log::join`] puts several experiments one after the other.
 //! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a gap.
 //!   A [`JointRecord`] has any number of outputs.
+//! - [`mended`] makes a clock rise that stood still or went back where it is certain how.
 //! - [`Rows`] and [`Split`] say which rows serve for what. Rows are counted from 1, and a range includes both ends.
 //! - [`Detrend`] finds the [`Offset`] of each channel, [`Prefilter`] is a band of frequencies.
 //! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by [`Interpolation`], after a
@@ -24,6 +25,7 @@
 mod digest;
 mod joint_record;
 mod log;
+mod mend;
 mod offset;
 mod prefilter;
 mod prepare;
@@ -39,7 +41,8 @@ mod tests;
 pub(crate) use digest::{digest, digests, inside, text_digest};
 pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
-pub(crate) use log::{GAP, JITTER, Padding, check, measured};
+pub(crate) use log::{GAP, JITTER, Padding, check, gap_above, gap_of, measured};
+pub use mend::{Calendar, Mended, mended};
 pub use offset::Offset;
 pub use prefilter::Prefilter;
 pub(crate) use prefilter::Prefiltered;

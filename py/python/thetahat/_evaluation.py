@@ -288,6 +288,8 @@ def inspect(
     sample_time: Duration | None = None,
     resample: Resample | None = None,
     time_format: str | None = None,
+    time_unit: str | None = None,
+    time_zone: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
@@ -305,8 +307,10 @@ def inspect(
         The data, or a CSV file, whose clock may be irregular.
     inputs, output
         The columns of a file that are inputs and output; without names all columns of numbers are inspected.
-    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
-        How a file is read, see `thetahat.ReadOptions`.
+    time, sample_time, resample, time_format, time_unit, time_zone
+        The clock of a file, see `thetahat.ReadOptions`.
+    delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
+        How it is written, see `thetahat.ReadOptions`.
 
     Returns
     -------

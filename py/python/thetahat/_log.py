@@ -33,7 +33,7 @@ class Log:
         The clock instead: instants with or without a time zone, texts of them in ISO 8601, durations, or seconds; numbers that can
         only be s, ms, µs or ns since 1970, by their size, are these. Steps may differ from their median by 10 %; one longer than
         1.5 medians is a gap. An index of pandas that all series share is the clock if it holds times; one that counts rows is not.
-    resample : (float or timedelta, {"linear", "hold"}) or (…, "unfiltered"), optional
+    resample : (float or timedelta, {"linear", "hold", "auto"}) or (…, "unfiltered"), optional
         Puts the log on another clock: time between the new rows, and how to read between the old ones. A step of two recorded
         ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
     input_names : sequence of str, optional

@@ -33,7 +33,7 @@ Duration = Union[float, datetime.timedelta, "np.timedelta64"]
 """Seconds, or a timedelta of Python, NumPy or pandas."""
 
 Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
-"""The time between the new rows, "linear" or "hold", and "unfiltered" where no filter is wanted."""
+"""The time between the new rows, "linear", "hold" or "auto", and "unfiltered" where no filter is wanted."""
 
 
 Band = Union["tuple[float | None, float | None]", str]
@@ -366,14 +366,20 @@ class ReadOptions(TypedDict, total=False):
     Attributes
     ----------
     time : str
-        The column that holds the times: seconds, or dates.
+        The column that holds the times: numbers, or dates; two, of dates and of times of day, as "date,time". Without it the one column
+        that is a clock by its name and its values.
     sample_time : float or timedelta
         Time from one row to the next, where no column holds it.
-    resample : (float or timedelta, {"linear", "hold"}) or (…, "unfiltered")
-        Put the log on another clock: time between the new rows, and how to read between the old ones. A step of two recorded
+    resample : (float or timedelta, {"linear", "hold", "auto"}) or (…, "unfiltered")
+        Put the log on another clock: time between the new rows, and how to read between the old ones; "auto" holds channels that move
+        in steps. A step of two recorded
         ones or more is filtered against aliasing first, unless "unfiltered" is added or the clock is irregular.
     time_format : str
-        How times are written, in strftime's notation.
+        How times are written, in strftime's notation. Without it the first rows say.
+    time_unit : {"ns", "us", "ms", "s", "min", "h", "d"}
+        The unit of times that are numbers. Without it their name and their size say, or they are seconds.
+    time_zone : str
+        The time zone of dates that have none, such as "Europe/Berlin".
     delimiter, comment, encoding : str
         The character between fields; the one that begins a comment; the file's encoding.
     decimal_comma : bool
@@ -393,6 +399,8 @@ class ReadOptions(TypedDict, total=False):
     sample_time: Duration
     resample: Resample
     time_format: str
+    time_unit: str
+    time_zone: str
     delimiter: str
     comment: str
     encoding: str
@@ -536,7 +544,7 @@ def text(name: str, value: Any) -> str:
 def resampling(name: str, value: Any) -> tuple[float, str, bool]:
     """The step in seconds, how to read between rows, and whether to filter against aliasing."""
     if not isinstance(value, (tuple, list)) or len(value) not in (2, 3):
-        raise TypeError(f"{name}: expected (seconds, 'linear' or 'hold'), found {value!r}")
+        raise TypeError(f"{name}: expected (seconds, 'linear', 'hold' or 'auto'), found {value!r}")
     if len(value) == 3 and value[2] != "unfiltered":
         raise ValueError(f"{name}: {value[2]!r} is not 'unfiltered'; leave it out for a filter")
     return seconds(name, value[0]), text(name, value[1]), len(value) == 2

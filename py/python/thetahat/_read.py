@@ -25,6 +25,8 @@ def read_csv(
     resample: Resample | None = None,
     uniform: bool = True,
     time_format: str | None = None,
+    time_unit: str | None = None,
+    time_zone: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
@@ -46,8 +48,10 @@ def read_csv(
         The column that is the output, or those that are: y, unless said otherwise.
     uniform : bool, default True
         Whether the steps of the clock have to be even. Models in equations take any.
-    time, sample_time, resample, time_format, delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
-        How the file is read, see `thetahat.ReadOptions`.
+    time, sample_time, resample, time_format, time_unit, time_zone
+        The clock of the file, see `thetahat.ReadOptions`.
+    delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
+        How it is written, see `thetahat.ReadOptions`.
 
     Returns
     -------
@@ -63,7 +67,7 @@ def read_csv(
     Warns
     -----
     UserWarning
-        For what may be meant otherwise, such as a column that looks like a clock and is not named.
+        For what may be meant otherwise, such as a line that is read as units.
 
     Examples
     --------
@@ -108,7 +112,8 @@ def read_log(
     output : str or sequence of str, optional
         The column that is the output, or those that are: y, unless said otherwise.
     time : str, optional
-        The column that holds the times: instants, dates or durations, seconds, or texts of dates.
+        The column that holds the times: instants, dates or durations, numbers, or texts of dates. Without it the one column that is a
+        clock.
     sample_time, resample
         As for `Log`.
     uniform : bool, default True
@@ -128,7 +133,7 @@ def read_log(
     Warns
     -----
     UserWarning
-        For what may be meant otherwise, such as a column of times that is not named, and for whole numbers beyond 2^53, which are rounded.
+        For whole numbers beyond 2^53, which are rounded.
 
     See Also
     --------
@@ -178,7 +183,7 @@ def _read(
         log = log.select([] if inputs is None else names_of("inputs", inputs), outputs)
     for note in notes:
         _said.warn(note, stacklevel=3)
-    time = options.get("time")
+    time, _ = log.clock
     said = "assumed" if time is None and options.get("sample_time") is None else "" if time is None else f"by column {time!r}"
     return Log._of(log, Clock(said if options.get("resample") is None else f"{said}, resampled"))
 

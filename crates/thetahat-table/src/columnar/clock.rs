@@ -117,8 +117,7 @@ impl Clock {
 
 /// An instant as a text that reads as it: in the zone where it was written if that is an offset from UTC, else in UTC.
 fn written(nanoseconds: i128, zone: &Zone) -> Result<String, String> {
-    let timestamp = Timestamp::from_nanosecond(nanoseconds)
-        .map_err(|_| "the time is no date between the years -9999 and 9999; correct it".to_owned())?;
+    let timestamp = Timestamp::from_nanosecond(nanoseconds).map_err(|_| time::NO_DATE.to_owned())?;
     let civil = Offset::UTC.to_datetime(timestamp);
     Ok(match zone {
         Zone::Day => civil.date().to_string(),

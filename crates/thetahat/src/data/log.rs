@@ -14,6 +14,10 @@ use crate::figures::short;
 const PADDING: usize = 20;
 /// A step longer than this many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
+/// Where this part of the steps is longer, they are none: the log is one of two rates. Then a gap is longer than 1.5 of the step that
+/// all but a few have.
+const TWO_RATES: f64 = 1.0 / 3.0;
+const FEW: f64 = 0.05;
 /// Steps may differ from their median by this fraction.
 pub(crate) const JITTER: f64 = 0.1;
 
@@ -67,6 +71,9 @@ pub enum Interpolation {
     Hold,
     /// A straight line from one sample to the next.
     Linear,
+    /// Each channel its own: one that moves in steps holds its last value, a smooth one is read from straight lines. Not through a gap of
+    /// the clock.
+    Auto,
 }
 
 /// Rows at the end of which all channels repeat one value.
@@ -129,7 +136,8 @@ impl Log {
     }
 
     /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step;
-    /// a step over 1.5 medians starts a new segment.
+    /// a step over 1.5 medians starts a new segment. Where a third of all steps is longer, the log is one of two rates: then a step over
+    /// 1.5 of what all but a twentieth have.
     ///
     /// # Errors
     /// [`Error::Data`] as for [`Log::new`], if time is not finite, repeats or goes back, and if another step differs
@@ -157,7 +165,8 @@ impl Log {
     pub fn recorded(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
         let Checked { rows, missing } = Checked::new(&channels)?;
         let median = median_step(&time, rows)?;
-        let long = steps(&time).enumerate().filter(|(_, step)| *step > GAP * median);
+        let gap = gap_above(&mut steps(&time).collect::<Vec<f64>>(), median);
+        let long = steps(&time).enumerate().filter(|(_, step)| *step > gap);
         let starts: Vec<usize> = long.map(|(position, _)| position + 1).collect();
         let irregular = irregularity(&time, median, &starts);
         Ok(Self {
@@ -345,6 +354,11 @@ impl Log {
         !self.boundaries.is_empty()
     }
 
+    /// Seconds from the row before a row (0-based) to it.
+    pub(crate) fn step_to(&self, row: usize) -> f64 {
+        self.time.as_ref().map_or(self.sample_time, |time| time[row] - time[row - 1])
+    }
+
     /// The number of rows, at least 1.
     pub fn rows(&self) -> usize {
         self.rows
@@ -511,6 +525,17 @@ impl Log {
 }
 
 impl Interpolation {
+    /// The same for a channel with these values: one of the other two.
+    pub(super) fn of(self, values: &[f64]) -> Self {
+        if self != Self::Auto {
+            return self;
+        }
+        let pairs = values.windows(2).filter(|pair| !pair[0].is_nan() && !pair[1].is_nan());
+        let (still, all) =
+            pairs.fold((0, 0), |(still, all), pair| (still + usize::from(pair[0] == pair[1]), all + 1));
+        if 2 * still > all { Self::Hold } else { Self::Linear }
+    }
+
     /// The value at `instant`, which lies at or after sample `left` and before the next.
     pub(super) fn read(self, time: &[f64], values: &[f64], left: usize, instant: f64) -> f64 {
         let value = values[left];
@@ -630,6 +655,22 @@ fn irregularity(time: &[f64], median: f64, starts: &[usize]) -> Option<Error> {
 
 pub(super) fn steps(time: &[f64]) -> impl Iterator<Item = f64> {
     time.windows(2).map(|pair| pair[1] - pair[0])
+}
+
+/// From how many seconds on a step is a gap, by the steps and their median.
+pub(crate) fn gap_above(steps: &mut [f64], median: f64) -> f64 {
+    let limit = GAP * median;
+    let long = steps.iter().filter(|step| **step > limit).count();
+    let few = (FEW * steps.len() as f64) as usize;
+    gap_of(limit, long as f64, steps.len() as f64, || {
+        let (_, step, _) = steps.select_nth_unstable_by(steps.len() - 1 - few, f64::total_cmp);
+        *step
+    })
+}
+
+/// The same by the number of steps above the limit for one rate, and by the step that all but a few have.
+pub(crate) fn gap_of(limit: f64, long: f64, steps: f64, most: impl FnOnce() -> f64) -> f64 {
+    if long > 0.0 && long >= TWO_RATES * steps { GAP * most() } else { limit }
 }
 
 /// The median time step of a clock that runs forward.

@@ -54,6 +54,17 @@ impl fmt::Display for Regular {
     }
 }
 
+/// The shortest step that one in twenty has and that does not make too many rows of a log: none where there is none. The steps are
+/// sorted.
+pub(crate) fn coarser(time: &[f64], steps: &mut [f64]) -> Option<f64> {
+    steps.sort_unstable_by(f64::total_cmp);
+    let span = time.last()? - time.first()?;
+    let alike = steps.chunk_by(|a, b| b - a <= ROUND_STEP * a);
+    let often = alike.filter(|group| 20 * group.len() >= steps.len()).map(|group| group[group.len() / 2]);
+    let rounded = often.map(|step| shortest(step, ROUND_STEP * step));
+    rounded.into_iter().find(|step| *step > 0.0 && span / step < MOST_GROWTH * time.len() as f64)
+}
+
 /// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
 /// which is not the clock's.
 pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {

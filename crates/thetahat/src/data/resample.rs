@@ -25,7 +25,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_numerics::regression::product;
 
-use super::log::{check, median_step, steps};
+use super::log::{check, gap_above, median_step, steps};
+use super::regular::coarser;
 use super::{Channel, GAP, Interpolation, JITTER, Log};
 use crate::Error;
 use crate::figures::short;
@@ -34,6 +35,8 @@ use crate::figures::short;
 const MOST_ROWS: f64 = 1e8;
 /// A step from this many recorded ones on is filtered for.
 const DECIMATES: f64 = 2.0;
+/// A log of two rates is not put on a clock that is slower than the faster rate by more than this factor.
+const SLOWER: f64 = 4.0;
 /// Where the pass band ends and the stop band begins, in units of half the new sampling frequency.
 const PASS: f64 = 0.8;
 const STOP: f64 = 1.0;
@@ -66,6 +69,31 @@ impl Resample {
     /// With an anti-alias filter where it applies.
     pub fn new(step: f64, interpolation: Interpolation) -> Self {
         Self { step, interpolation, anti_alias: true }
+    }
+
+    /// What puts a log of two rates on a uniform clock: the faster of them, or one up to four times slower where there would be more than
+    /// ten rows for each recorded one; each channel is read its own way. None for a log of one rate, and where none is slow enough.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if the times are not finite or do not rise.
+    ///
+    /// ```
+    /// use thetahat::data::Resample;
+    ///
+    /// // Every second after a step, then every ten.
+    /// let time: Vec<f64> = (0..60).map(f64::from).chain((6..66).map(|k| 10.0 * f64::from(k))).collect();
+    /// assert_eq!(Resample::for_two_rates(&time)?.map(|how| how.step), Some(1.0));
+    /// assert_eq!(Resample::for_two_rates(&time[..60])?, None);
+    /// # Ok::<(), thetahat::Error>(())
+    /// ```
+    pub fn for_two_rates(time: &[f64]) -> Result<Option<Self>, Error> {
+        let median = median_step(time, time.len())?;
+        let mut all: Vec<f64> = steps(time).collect();
+        if gap_above(&mut all, median) <= GAP * median {
+            return Ok(None);
+        }
+        let step = coarser(time, &mut all).filter(|step| *step <= SLOWER * median);
+        Ok(step.map(|step| Self { step, interpolation: Interpolation::Auto, anti_alias: false }))
     }
 
     /// The filter for a log with these times; none where it does not apply: for a step below twice the recorded one, and for
@@ -239,10 +267,22 @@ impl Log {
         let filter = how.filter_for(time)?;
         let weights = filter.map(|filter| filter.weights(recorded, rows));
         let filtered = weights.as_ref().map(|weights| Filtered::new(&channels, time, recorded, weights));
+        let gap = match interpolation {
+            Interpolation::Auto => gap_above(&mut steps(time).collect::<Vec<f64>>(), recorded),
+            Interpolation::Hold | Interpolation::Linear => f64::INFINITY,
+        };
+        let in_gap = |instant: f64, left: usize| {
+            instant - time[left] > rounding && time.get(left + 1).is_some_and(|next| next - time[left] > gap)
+        };
         let values = |channel: &Channel| -> Vec<f64> {
             let own = &channel.values;
+            let interpolation = interpolation.of(own);
             let Some(filtered) = &filtered else {
-                return read().map(|(instant, left)| interpolation.read(time, own, left, instant)).collect();
+                let value = |(instant, left)| match in_gap(instant, left) {
+                    true => f64::NAN,
+                    false => interpolation.read(time, own, left, instant),
+                };
+                return read().map(value).collect();
             };
             let value = |(instant, left): (f64, usize)| {
                 let late = instant - time[left] > rounding;

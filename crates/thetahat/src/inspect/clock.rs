@@ -4,7 +4,7 @@ use thetahat_numerics::regression::sum;
 
 use super::Clock;
 use crate::Error;
-use crate::data::{GAP, JITTER, Regular, Times, shortest};
+use crate::data::{JITTER, Regular, Resample, Times, gap_above, shortest};
 
 /// A clock and what is wrong with it.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,6 +18,8 @@ pub(super) struct Ticks {
     pub(super) repeats: bool,
     /// The uniform clock that goes with it; none where there is one already.
     pub(super) regular: Option<Regular>,
+    /// Where the clock has two rates, what a fit puts it on by itself.
+    pub(super) rates: Option<Resample>,
 }
 
 impl Ticks {
@@ -73,7 +75,8 @@ impl Ticks {
             ));
         };
         let median = shortest(median, 2.0 * f64::EPSILON * latest);
-        let (gaps, regular): (Vec<f64>, Vec<f64>) = steps.iter().partition(|step| **step > GAP * median);
+        let gap = gap_above(&mut steps.clone(), median);
+        let (gaps, regular): (Vec<f64>, Vec<f64>) = steps.iter().partition(|step| **step > gap);
         let off = |step: &&f64| (**step - median).abs() > JITTER * median;
         let count = regular.len().max(1) as f64;
         // In units of the median, so that no square leaves the range of numbers.
@@ -97,12 +100,13 @@ impl Ticks {
             first_backward: steps.iter().position(backward).map(|position| position + 2),
             repeats: steps.iter().find(|step| backward(step)) == Some(&0.0),
             regular: Some(Regular::of(time, median)),
+            rates: if steps.iter().any(backward) { None } else { Resample::for_two_rates(time)? },
         })
     }
 
     /// A clock that runs forward and is uniform, but for gaps.
     fn forward(clock: Clock) -> Self {
-        Self { clock, backward: 0, first_backward: None, repeats: false, regular: None }
+        Self { clock, backward: 0, first_backward: None, repeats: false, regular: None, rates: None }
     }
 }
 

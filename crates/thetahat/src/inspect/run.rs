@@ -200,10 +200,10 @@ fn uniform(
         return Ok(Ok((Log::with_time(channels, time)?, None)));
     }
     let regular = Regular::of(&time, ticks.clock.sample_time);
-    if asked.is_none() && !regular.is_worth() {
+    if asked.is_none() && ticks.rates.is_none() && !regular.is_worth() {
         return Ok(Err(IRREGULAR.to_owned()));
     }
-    let how = asked.unwrap_or_else(|| Resample::new(regular.step, Interpolation::Linear));
+    let how = asked.or(ticks.rates).unwrap_or_else(|| Resample::new(regular.step, Interpolation::Linear));
     let log = Log::resampled(channels, &time, &how)?;
     Ok(Ok((log, Some(Resampling::new(&how, &time)?))))
 }

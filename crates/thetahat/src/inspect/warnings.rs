@@ -2,6 +2,7 @@
 
 use super::clock::Ticks;
 use super::{ChannelQuality, Inspection, InspectionPlan};
+use crate::data::Interpolation;
 use crate::figures::{fixed, short};
 
 /// A trend that explains this much of an output is worth a warning.
@@ -43,6 +44,15 @@ fn clock(inspection: &Inspection, ticks: &Ticks, plan: &InspectionPlan) -> Vec<S
         words.push(format!(
             "the time {how} at row {row} ({} such rows): sort the log by time and remove repeated rows",
             ticks.backward
+        ));
+    } else if let (None, Some(how)) = (plan.resample, ticks.rates) {
+        words.push(format!(
+            "the clock has two rates (steps from {} s to {} s, median {} s): models in continuous time and in equations take it as it is, \
+             for others a fit resamples it every {} s",
+            short(clock.steps.0),
+            short(clock.steps.1),
+            short(clock.sample_time),
+            how.step
         ));
     } else if let (true, None, Some(regular)) = (clock.irregular, plan.resample, ticks.regular) {
         words.push(format!(
@@ -115,8 +125,9 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     let mut words = Vec::new();
     if let Some(resampled) = inspection.log.resampled.as_ref().filter(|_| plan.resample.is_none()) {
         words.push(format!(
-            "excitation, delay and feedback are those of the log resampled every {} s by straight lines",
-            resampled.step
+            "excitation, delay and feedback are those of the log resampled every {} s{}",
+            resampled.step,
+            if resampled.interpolation == Interpolation::Linear { " by straight lines" } else { "" }
         ));
     }
     for excitation in &inspection.excitation {

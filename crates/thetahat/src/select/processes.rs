@@ -96,6 +96,7 @@ impl<'a> Excerpt<'a> {
             seen.held.to_mut().push(HeldLog {
                 counted: vec![rows.clone()],
                 rows,
+                after_pause: part.after_pause,
                 begins: part.begins,
                 times: kept.iter().map(|row| part.times[*row]).collect(),
                 inputs: part

@@ -31,7 +31,7 @@ pub(crate) struct Background {
     pub(crate) level: bool,
     /// Its slope.
     pub(crate) slope: bool,
-    /// The state in which each log begins.
+    /// The state in which each log begins; one after a pause has a state of its own anyway.
     pub(crate) free: bool,
 }
 
@@ -43,11 +43,13 @@ impl Background {
 
     /// Those of free responses.
     pub(crate) fn free(self, held: &[HeldLog], structures: &[ProcessStructure]) -> usize {
-        if self.free {
-            held.len() * structures.iter().map(ProcessStructure::states).sum::<usize>()
-        } else {
-            0
-        }
+        let states: usize = structures.iter().map(ProcessStructure::states).sum();
+        held.iter().filter(|part| self.is_free(part)).count() * states
+    }
+
+    /// Whether a log has a state of its own.
+    fn is_free(self, part: &HeldLog) -> bool {
+        self.free || part.after_pause
     }
 
     pub(crate) fn columns(self, held: &[HeldLog], structures: &[ProcessStructure]) -> usize {
@@ -418,8 +420,8 @@ impl<'a> ProcessObjective<'a> {
             let lags = parts.shape.len();
             // What the first state does depends on the shape too.
             let mut free = vec![0.0; part.times.len() * lags];
-            let first = self.first_states.get(number * states + before..);
-            if let (true, Some(first)) = (self.background.free, first) {
+            let first = self.first_states.get(self.free_before(number) * states + before..);
+            if let (true, Some(first)) = (self.background.is_free(part), first) {
                 let first = &first[..structure.states().min(first.len())];
                 free_sensitivities(structure, &parts.shape, first, &part.times, |row, slopes| {
                     free[row * lags..(row + 1) * lags].copy_from_slice(&slopes[..lags]);
@@ -434,6 +436,11 @@ impl<'a> ProcessObjective<'a> {
                 whole.iter_mut().zip(&own).for_each(|(column, value)| column[row] = *value);
             });
         })
+    }
+
+    /// How many of the logs before one have a state of their own.
+    fn free_before(&self, number: usize) -> usize {
+        self.held[..number].iter().filter(|part| self.background.is_free(part)).count()
     }
 
     /// The states of structures before that of an input, and of all.
@@ -475,16 +482,14 @@ impl<'a> ProcessObjective<'a> {
         for (input, (structure, parts)) in self.structures.iter().zip(parts).enumerate() {
             columns.extend(self.columns_of(input, structure, parts));
         }
-        if self.background.free {
-            columns.extend(self.free_columns(parts));
-        }
+        columns.extend(self.free_columns(parts, true));
         columns
     }
 
-    /// What each log has of a first state of its own.
-    fn free_columns(&self, parts: &[Parts<f64>]) -> Vec<Vec<f64>> {
+    /// What a first state does in each log that has one of its own, or in each that has not.
+    fn free_columns(&self, parts: &[Parts<f64>], free: bool) -> Vec<Vec<f64>> {
         let mut columns = Vec::new();
-        for own in 0..self.held.len() {
+        for own in (0..self.held.len()).filter(|own| self.background.is_free(&self.held[*own]) == free) {
             for (structure, parts) in self.structures.iter().zip(parts) {
                 columns.extend(self.stacked(structure.states(), |part, number, whole| {
                     if number == own {
@@ -510,9 +515,7 @@ impl<'a> ProcessObjective<'a> {
             }));
         }
         columns.extend(self.offset_columns());
-        if self.background.free {
-            columns.extend(self.free_columns(parts));
-        }
+        columns.extend(self.free_columns(parts, true));
         columns
     }
 
@@ -522,7 +525,7 @@ impl<'a> ProcessObjective<'a> {
             return 0.0;
         }
         let mut span = self.span.clone();
-        for column in self.free_columns(&self.parts) {
+        for column in self.free_columns(&self.parts, false) {
             span.add(column);
         }
         let mut left = self.residuals.clone();

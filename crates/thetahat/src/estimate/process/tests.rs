@@ -154,6 +154,7 @@ fn transfer_functions_are_found_on_any_clock() -> Result<(), Error> {
         let held = [HeldLog {
             rows: rows.clone(),
             counted: vec![rows.clone()],
+            after_pause: false,
             begins: times[begin],
             times: times[begin..].iter().map(|time| time - times[begin]).collect(),
             inputs: vec![input[begin..].to_vec()],

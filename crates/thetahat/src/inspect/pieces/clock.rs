@@ -2,7 +2,7 @@
 
 use super::counts::Counts;
 use crate::Error;
-use crate::data::{GAP, JITTER, Regular, shortest};
+use crate::data::{GAP, JITTER, Regular, gap_of, shortest};
 use crate::inspect::Clock;
 use crate::inspect::clock::Ticks;
 
@@ -117,10 +117,18 @@ impl Steps {
     /// As for [`median`](Self::median).
     pub(super) fn finish(&mut self) -> Result<(Ticks, bool), Error> {
         let (median, exact) = self.median()?;
+        let above = |limit: f64| {
+            self.steps.values().filter(|(step, _)| *step > limit).map(|(_, times)| times).sum::<u64>()
+        };
+        let all = self.steps.count();
+        // The same rule as of a log that is held in memory.
+        let few = all / 20;
+        let most = || self.steps.at(all.saturating_sub(1 + few)).unwrap_or(median);
+        let gap = gap_of(GAP * median, above(GAP * median) as f64, all as f64, most);
         let (mut count, mut gaps, mut total) = (0.0, 0, 0.0);
         let mut irregular = false;
         for (step, times) in self.steps.values() {
-            if step > GAP * median {
+            if step > gap {
                 gaps += times as usize;
             } else {
                 count += times as f64;
@@ -129,7 +137,7 @@ impl Steps {
             }
         }
         let mean = total / count.max(1.0);
-        let regular = self.steps.values().filter(|(step, _)| *step <= GAP * median);
+        let regular = self.steps.values().filter(|(step, _)| *step <= gap);
         let square: f64 = regular.map(|(step, times)| times as f64 * (step / median - mean).powi(2)).sum();
         let clock = Clock {
             sample_time: median,
@@ -145,6 +153,7 @@ impl Steps {
             first_backward: self.first_backward.map(|(row, _)| row),
             repeats: self.first_backward.is_some_and(|(_, repeats)| repeats),
             regular: Some(Regular::new(self.last - self.first, self.rows, median)),
+            rates: None,
         };
         Ok((ticks, exact))
     }

@@ -20,6 +20,8 @@ use crate::model::{Chain, Columns, MOST_POLES, Parts, ProcessStructure, State, T
 /// Derivatives that are computed together: as many as lags have shapes, or as transfer functions have.
 const LAGS: usize = 3;
 pub(super) const LANE: usize = MOST_POLES;
+/// A pause is a gap of the clock of more than so many usual steps.
+const PAUSE: f64 = 10.0;
 /// Steps of a clock that differ by so many roundings of its time are the same.
 const ROUNDINGS: f64 = 8.0;
 
@@ -30,6 +32,8 @@ pub(crate) struct HeldLog {
     pub(crate) rows: Range<usize>,
     /// Which of them count, in the same numbers.
     pub(crate) counted: Vec<Range<usize>>,
+    /// Whether it begins after a pause of the clock, in which nobody knows what its inputs were: its state is then its own.
+    pub(crate) after_pause: bool,
     /// Where its first row stands on the clock of all of them, in seconds.
     pub(crate) begins: f64,
     /// Seconds since its first row.
@@ -40,18 +44,29 @@ pub(crate) struct HeldLog {
     pub(crate) held: usize,
 }
 
-/// Each of the joined logs that has some of the rows.
+/// Each of the joined logs that has some of the rows, in pieces without a long pause of the clock. Through a short one inputs hold.
 ///
 /// # Errors
 /// [`Error::Data`] for a channel that is not there, or an input that has no value at all.
 pub(crate) fn held_logs(log: &Log, inputs: &[&str], rows: &[Rows]) -> Result<Vec<HeldLog>, Error> {
-    let of_part = |part: Range<usize>| {
+    let of_part = |(part, after_pause): (Range<usize>, bool)| {
         let asked = inside(rows, &part);
         let end = part.start + asked.last()?.end;
         let counted = asked.into_iter().map(|rows| rows.start + part.start..rows.end + part.start).collect();
-        Some(HeldLog::new(log, inputs, part.start..end, counted))
+        let held = HeldLog::new(log, inputs, part.start..end, counted);
+        Some(held.map(|held| HeldLog { after_pause, ..held }))
     };
-    log.logs().filter_map(of_part).collect()
+    log.logs().flat_map(|own| between_pauses(log, own)).filter_map(of_part).collect()
+}
+
+/// The rows of a log between its long pauses, and whether they follow one.
+fn between_pauses(log: &Log, own: Range<usize>) -> Vec<(Range<usize>, bool)> {
+    let is_long =
+        |row: &usize| own.contains(row) && *row > own.start && log.step_to(*row) > PAUSE * log.sample_time();
+    let pauses: Vec<usize> = log.segment_starts().iter().copied().filter(is_long).collect();
+    let ends = pauses.iter().copied().chain([own.end]);
+    let firsts = std::iter::once((own.start, false)).chain(pauses.iter().map(|row| (*row, true)));
+    firsts.zip(ends).map(|((first, after), end)| (first..end, after)).collect()
 }
 
 impl HeldLog {
@@ -81,7 +96,8 @@ impl HeldLog {
             };
             held.push(values.iter().map(hold).collect());
         }
-        Ok(Self { begins: log.elapsed(rows.start), rows, counted, times, inputs: held, held: missing })
+        let begins = log.elapsed(rows.start);
+        Ok(Self { rows, counted, after_pause: false, begins, times, inputs: held, held: missing })
     }
 }
 

@@ -53,9 +53,10 @@ impl<'l> ProcessOnLog<'l> {
         })
     }
 
-    /// Adds to a response what the state that explains the outputs best in the rows that count does to it.
-    fn add_free(&self, response: &mut [f64]) {
-        for part in &self.held {
+    /// Adds to a response what the state that explains the outputs best in the rows that count does to it, of all logs or of those that
+    /// begin after a pause.
+    fn add_free(&self, response: &mut [f64], all: bool) {
+        for part in self.held.iter().filter(|part| all || part.after_pause) {
             let first = part.rows.start;
             let rows: Vec<usize> =
                 part.counted.iter().cloned().flatten().filter(|row| !self.output[*row].is_nan()).collect();
@@ -109,8 +110,8 @@ impl OnLog for ProcessOnLog<'_> {
     fn respond(&self, _: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
         let mut response = self.run_at_rest().to_vec();
         match start {
-            InitialCondition::Zero => {}
-            InitialCondition::Estimate => self.add_free(&mut response),
+            InitialCondition::Zero => self.add_free(&mut response, false),
+            InitialCondition::Estimate => self.add_free(&mut response, true),
             InitialCondition::Drop => {
                 return Err(Error::argument(
                     "initial",

@@ -481,7 +481,6 @@ fn calendar(of: thetahat_table::Calendar) -> Calendar {
         thetahat_table::Calendar::TimesOfDay => Calendar::TimesOfDay,
         thetahat_table::Calendar::Wall { first } => Calendar::Wall { first: first as f64 / 1e9 },
         thetahat_table::Calendar::Instants => Calendar::Instants,
-        thetahat_table::Calendar::Zone => Calendar::Zone,
     }
 }
 

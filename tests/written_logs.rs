@@ -321,3 +321,26 @@ fn a_pause_of_the_clock_is_no_part_of_a_response() {
     };
     assert_eq!(fit("log.csv"), fit("first.csv second.csv"));
 }
+
+#[test]
+fn dates_come_back_as_dates() {
+    let line = |t: f64, u: f64, y: f64| format!("2024-01-10T{}Z,{u},{y:.4}", time_of_day(t).0);
+    let folder = Folder::with_log(written("time,u,y\n", line));
+    folder.done("fit log.csv --structure p1 --report model.json --html page.html");
+    let times = |verb: &str| -> Vec<String> {
+        let csv = folder.done(&format!("{verb} model.json log.csv")).stdout;
+        csv.lines().map(|line| line.split(',').next().unwrap_or_default().to_owned()).collect()
+    };
+    for verb in ["predict", "simulate"] {
+        let times = times(verb);
+        assert_eq!(times[..3], ["time", "2024-01-10T00:00:00Z", "2024-01-10T00:00:10Z"], "{verb}");
+        assert_eq!(times.last().map(String::as_str), Some("2024-01-10T00:39:50Z"), "{verb}");
+    }
+    // An axis of dates has milliseconds since 1970.
+    assert!(folder.read("page.html").contains("\"type\":\"date\""));
+    folder.done("inspect log.csv --html inspection.html");
+    assert!(folder.read("inspection.html").contains("1704844810000"));
+    // Seconds stay seconds.
+    folder.write("log.csv", written("time,u,y\n", |t, u, y| format!("{t},{u},{y:.4}")));
+    assert_eq!(times("simulate")[..3], ["time", "0.0", "10.0"]);
+}

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use thetahat::data::{Detrend, Log};
+use thetahat::data::{Detrend, Log, Source};
 use thetahat::report::{Applied, sample};
 use thetahat::respond::{Drawn, Draws, Horizon, InitialCondition};
 
@@ -83,8 +83,8 @@ fn respond(
     words.iter().for_each(|word| warn(word));
     let natural = || if measured { model.natural_start(horizon) } else { InitialCondition::Zero };
     let initial = initial.unwrap_or_else(natural);
-    let clock = RowClock { log: &log };
     let sources = [source];
+    let clock = RowClock { log: &log, source: &sources[0] };
     let failed = log::failure(&sources);
     let applied = match run {
         Run::Clamped => report.clamped_run(&log, &asked, detrend, initial),
@@ -147,14 +147,26 @@ fn respond(
 /// What the rows of an answer are called.
 struct RowClock<'l> {
     log: &'l Log,
+    source: &'l Source,
+}
+
+/// A row by its time, or by its number.
+#[derive(serde::Serialize)]
+#[serde(untagged)]
+enum RowName {
+    Date(String),
+    Seconds(f64),
+    Number(usize),
 }
 
 impl RowClock<'_> {
-    /// The time of a row (0-based), where there are times; those after the end of the log go on in its own step.
-    fn at(&self, position: usize) -> Option<f64> {
+    /// The time of a row (0-based), as the log has it, where there are times; those after the end of the log go on in its own step.
+    fn at(&self, position: usize) -> RowName {
         let rows = self.log.rows();
         let beyond = (position + 1).saturating_sub(rows) as f64 * self.log.sample_time();
-        self.log.time().map(|time| time[position.min(rows - 1)] + beyond)
+        let Some(time) = self.log.time() else { return RowName::Number(position + 1) };
+        let seconds = time[position.min(rows - 1)] + beyond;
+        self.source.instant(seconds).map_or(RowName::Seconds(seconds), RowName::Date)
     }
 }
 
@@ -215,10 +227,7 @@ fn columns_as_csv(
     let asked = applied.rows.iter().flat_map(|range| range.first() - 1..range.last());
     for position in asked.chain((0..applied.beyond).map(|beyond| clock.log.rows() + beyond)) {
         let values: Vec<Option<f64>> = columns.iter().map(|(_, values)| value(*values, position)).collect();
-        match clock.at(position) {
-            Some(time) => csv.serialize((time, values))?,
-            None => csv.serialize((position + 1, values))?,
-        }
+        csv.serialize((clock.at(position), values))?;
     }
     Ok(())
 }

@@ -139,12 +139,12 @@ impl Reader {
         progress: &mut dyn FnMut(u64, Option<u64>),
         take: &mut dyn FnMut(Table) -> ControlFlow<()>,
     ) -> Result<(), Error> {
-        let Self { any, file, zone } = self;
+        let Self { any, file, mut zone } = self;
         // What cannot be read in the zone ends the reading.
         let mut failed = None;
         let mut take = |mut table: Table| {
             table.calendar = Calendar::of(table.start.as_deref());
-            match zone.as_ref().map_or(Ok(()), |zone| zone.apply(&file, &mut table)) {
+            match zone.as_mut().map_or(Ok(()), |zone| zone.apply(&file, &mut table)) {
                 Ok(()) => take(table),
                 Err(error) => {
                     failed = Some(error);

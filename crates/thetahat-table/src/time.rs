@@ -161,8 +161,6 @@ pub enum Calendar {
     },
     /// Instants.
     Instants,
-    /// Instants of a zone in which the hour that comes twice in autumn was read as the first of both.
-    Zone,
 }
 
 impl Calendar {

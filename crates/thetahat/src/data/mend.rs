@@ -51,8 +51,6 @@ pub enum Calendar {
     },
     /// Instants: their clock is not set.
     Instants,
-    /// Instants of a zone in which the hour that comes twice in autumn was read as the first of both.
-    Zone,
 }
 
 /// A clock of which the rows come in order, made to rise where it is certain how.
@@ -173,10 +171,9 @@ impl Mended {
         let recorded = self.time.clone();
         let at = |row: usize| match calendar {
             Calendar::Wall { first } => is_change(first + recorded[row] - recorded[0]),
-            Calendar::Zone => true,
             _ => false,
         };
-        let (mut ahead, mut hour_since) = (0.0, None);
+        let mut ahead = 0.0;
         for row in 1..recorded.len() {
             let step = recorded[row] - recorded[row - 1];
             let near = |wanted: f64| (step - wanted).abs() <= NEAR * usual;
@@ -187,20 +184,14 @@ impl Mended {
                      `time-zone` says which zone it is, and UTC that it is none",
                     row + 1
                 ));
-            } else if matches!(calendar, Calendar::Zone) && hour_since.is_some() && near(HOUR + usual) {
-                // The hour that came twice is over.
-                (ahead, hour_since) = (ahead - HOUR, None);
             } else if step <= 0.0 {
                 if near(usual - HOUR) && at(row) {
                     ahead += HOUR;
-                    hour_since = Some(row);
-                    if !matches!(calendar, Calendar::Zone) {
-                        self.words.push(format!(
-                            "in row {} the clock goes back by an hour, as where summer time ends: an hour is added from there \
-                             on; `time-zone` says which zone it is",
-                            row + 1
-                        ));
-                    }
+                    self.words.push(format!(
+                        "in row {} the clock goes back by an hour, as where summer time ends: an hour is added from there on; \
+                         `time-zone` says which zone it is",
+                        row + 1
+                    ));
                 } else if is_midnight(step, usual, &recorded, calendar) {
                     ahead += DAY;
                     self.words.push(format!(
@@ -313,13 +304,6 @@ mod tests {
         let found = mended(wall.clone(), Calendar::Wall { first }).unwrap();
         assert_eq!(found.time, exact);
         assert!(found.words[0].starts_with("in row 541 the clock goes back by an hour"), "{:?}", found.words);
-        // The hour that comes twice ends where the zone is known.
-        let zone: Vec<f64> = exact
-            .iter()
-            .map(|time| time - if (5400.0..9000.0).contains(time) { HOUR } else { 0.0 })
-            .collect();
-        let found = mended(zone, Calendar::Zone).unwrap();
-        assert_eq!((found.time, found.words), (exact.clone(), vec![]));
         // On another day, and of instants, it is a mistake.
         for calendar in [Calendar::Wall { first: first - 2.0 * DAY }, Calendar::Instants, Calendar::None] {
             let error = mended(wall.clone(), calendar).unwrap_err().to_string();

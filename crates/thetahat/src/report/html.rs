@@ -91,7 +91,8 @@ pub fn fit_page(
             let rows = runs.clone().find_map(|(_, run)| there(run)).unwrap_or(0..0);
             let runs: Vec<(String, &[f64])> =
                 runs.map(|(name, run)| (name.clone(), &run[rows.clone()])).collect();
-            let stack = Stack::new(&signals.time[rows.clone()], model.sample_time(), points(1 + runs.len()));
+            let stack = Stack::new(&signals.time[rows.clone()], model.sample_time(), points(1 + runs.len()))
+                .dated(&report.data.logs);
             let measured = signals.outputs.first().map(|output| (&output.name, &output.measured[rows]));
             section.chart(measured.map_or_else(|| Err(String::new()), |(name, measured)| charts::outputs(
                 "Free runs on rows held out",
@@ -180,7 +181,7 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
         section.text(UNASKED);
     }
     page.sections.push(section);
-    page.sections.extend(compared_outputs(reports, &named));
+    page.sections.extend(compared_outputs(reports, &named, logs));
 
     let mut section = Section::new("Residuals");
     let all: Vec<(String, &Residuals)> = residuals_of(&named).collect();
@@ -241,7 +242,8 @@ pub fn inspection_page(
     let signals: Vec<_> = signals.iter().filter(|(name, _)| left_out == 0 || shown(name).is_some()).collect();
     // Steps of a clock without a rhythm are no gaps.
     let step = if inspection.clock.irregular { f64::INFINITY } else { inspection.clock.sample_time };
-    let mut stack = Stack::new(time, step, points(signals.len()));
+    let dated = || Stack::new(time, step, points(signals.len())).dated(std::slice::from_ref(&inspection.log));
+    let mut stack = dated();
     let mut first = true;
     let circles = if inspection.channels.iter().any(|channel| !channel.outliers.is_empty()) {
         " Circles: values far from their neighbours, the first of each channel."
@@ -251,8 +253,7 @@ pub fn inspection_page(
     let words = &format!("One time axis: zooming one zooms all.{circles}");
     for (position, (name, values)) in signals.iter().enumerate() {
         if stack.is_full() {
-            let next = Stack::new(time, step, points(signals.len()));
-            section.chart(std::mem::replace(&mut stack, next).draw("Channels over time", words, &[]));
+            section.chart(std::mem::replace(&mut stack, dated()).draw("Channels over time", words, &[]));
             first = true;
         }
         stack.alone(name, values, position);

@@ -67,7 +67,7 @@ pub(super) fn outputs(
         let errors: Vec<f64> =
             output.measured.iter().zip(&predicted).map(|(y, predicted)| y - predicted).collect();
         let part = |values: &[f64]| values.get(shown.clone()).map(<[f64]>::to_vec).unwrap_or_default();
-        let mut stack = Stack::new(&time[shown.clone()], step, points);
+        let mut stack = Stack::new(&time[shown.clone()], step, points).dated(logs);
         stack.panel(&output.name);
         stack.measured("measured", &part(&output.measured));
         if there(&simulated) {
@@ -112,7 +112,7 @@ pub(super) fn outputs(
         }
     }
     for group in far.chunks(8) {
-        let mut stack = Stack::new(&time, step, points);
+        let mut stack = Stack::new(&time, step, points).dated(logs);
         for (position, (name, values)) in group.iter().enumerate() {
             stack.alone(name, values, 2 + position);
         }
@@ -139,13 +139,17 @@ pub(super) fn merged<'a>(signals: impl Iterator<Item = &'a [f64]>) -> Vec<f64> {
 }
 
 /// The outputs of several models on one log.
-pub(super) fn compared_outputs(reports: &[Report], models: &[(String, &Validated)]) -> Vec<Section> {
+pub(super) fn compared_outputs(
+    reports: &[Report],
+    models: &[(String, &Validated)],
+    logs: &[Source],
+) -> Vec<Section> {
     let Some((_, Validated { signals, .. })) = models.first() else { return Vec::new() };
     let any_clock = reports.iter().any(|report| report.model.takes_any_clock());
     let sample_time = reports.first().map_or(1.0, |report| report.model.sample_time());
     let step = if any_clock { f64::INFINITY } else { sample_time };
     let points = points(2 * (models.len() + 1));
-    let stack = || Stack::new(&signals.time, step, points);
+    let stack = || Stack::new(&signals.time, step, points).dated(logs);
     let mut outputs: Vec<&OutputSignals> = Vec::new();
     for output in models.iter().flat_map(|(_, validated)| &validated.signals.outputs) {
         if !outputs.iter().any(|known| known.name == output.name) {

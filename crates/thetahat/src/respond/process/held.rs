@@ -22,6 +22,8 @@ const LAGS: usize = 3;
 pub(super) const LANE: usize = MOST_POLES;
 /// A pause is a gap of the clock of more than so many usual steps.
 const PAUSE: f64 = 10.0;
+/// And of more than so many of the steps beside it.
+const ALONE: f64 = 3.0;
 /// Steps of a clock that differ by so many roundings of its time are the same.
 const ROUNDINGS: f64 = 8.0;
 
@@ -61,9 +63,16 @@ pub(crate) fn held_logs(log: &Log, inputs: &[&str], rows: &[Rows]) -> Result<Vec
 
 /// The rows of a log between its long pauses, and whether they follow one.
 fn between_pauses(log: &Log, own: Range<usize>) -> Vec<(Range<usize>, bool)> {
-    let is_long =
-        |row: &usize| own.contains(row) && *row > own.start && log.step_to(*row) > PAUSE * log.sample_time();
-    let pauses: Vec<usize> = log.segment_starts().iter().copied().filter(is_long).collect();
+    // Several long steps of a length are another rate.
+    let is_alone = |row: usize| {
+        let near =
+            [row.checked_sub(1).filter(|row| *row > own.start), Some(row + 1).filter(|row| *row < own.end)];
+        let longest = near.into_iter().flatten().map(|row| log.step_to(row)).fold(0.0, f64::max);
+        log.step_to(row) > ALONE * longest
+    };
+    let is_long = |row: &usize| log.step_to(*row) > PAUSE * log.sample_time() && is_alone(*row);
+    let inside = log.segment_starts().iter().copied().filter(|row| own.contains(row) && *row > own.start);
+    let pauses: Vec<usize> = inside.filter(is_long).collect();
     let ends = pauses.iter().copied().chain([own.end]);
     let firsts = std::iter::once((own.start, false)).chain(pauses.iter().map(|row| (*row, true)));
     firsts.zip(ends).map(|((first, after), end)| (first..end, after)).collect()

@@ -2,13 +2,13 @@
 
 use serde_json::{Value, json};
 
-use super::super::decimate::decimate;
+use super::super::decimate::{Curve, decimate};
 use super::super::figure::{
     self, COLOURS, Drawn, NEUTRAL, axis, chart, layout, line, plain_line, significant,
 };
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
-use crate::data::Rows;
+use crate::data::{Rows, Source};
 
 /// More panels than these go into a further figure.
 const MOST_PANELS: usize = 8;
@@ -36,6 +36,8 @@ pub(crate) struct Marked<'a> {
 /// Panels above each other over one time axis.
 pub(crate) struct Stack<'a> {
     time: &'a [f64],
+    /// Where times are dates: seconds from 1970 to the first one, as the clocks on the wall show it.
+    start: Option<f64>,
     /// A step of the clock above this one is a gap.
     longest: f64,
     /// The most points of a curve.
@@ -62,7 +64,31 @@ impl Panel {
 
 impl<'a> Stack<'a> {
     pub(crate) fn new(time: &'a [f64], sample_time: f64, points: usize) -> Self {
-        Self { time, longest: 1.5 * sample_time, points, traces: vec![], panels: vec![], curves: 0 }
+        let longest = 1.5 * sample_time;
+        Self { time, start: None, longest, points, traces: vec![], panels: vec![], curves: 0 }
+    }
+
+    /// The same with dates on its axis, where these are one log whose times are dates.
+    pub(crate) fn dated(self, logs: &[Source]) -> Self {
+        let start = match logs {
+            [log] => log.wall_seconds(),
+            _ => None,
+        };
+        Self { start, ..self }
+    }
+
+    /// A time as the axis has it: in seconds, or in milliseconds since 1970.
+    fn at(&self, time: f64) -> f64 {
+        self.start.map_or_else(|| significant(time), |start| ((start + time) * 1e6).round() / 1e3)
+    }
+
+    /// The points of a curve that are shown.
+    fn points(&self, values: &[f64]) -> Curve {
+        let mut curve = decimate(self.time, values, self.points, self.longest);
+        if self.start.is_some() {
+            curve.x.iter_mut().for_each(|time| *time = self.at(*time));
+        }
+        curve
     }
 
     /// Whether no further panel fits.
@@ -84,7 +110,7 @@ impl<'a> Stack<'a> {
         if let Some(panel) = self.panels.last_mut() {
             panel.window = window(values);
         }
-        let curve = decimate(self.time, values, self.points, self.longest);
+        let curve = self.points(values);
         // Wide and faint: what lies on it leaves it in sight.
         let wide = stroke(MEASURED, 4.0);
         self.traces.push(plain_line(name, curve, NEUTRAL).with("line", wide).with("yaxis", self.axis()));
@@ -108,7 +134,7 @@ impl<'a> Stack<'a> {
         if let Some(Panel { window: Some([low, high]), left, .. }) = self.panels.last_mut() {
             *left |= values.iter().any(|value| value < low || value > high);
         }
-        let curve = decimate(self.time, values, self.points, self.longest);
+        let curve = self.points(values);
         let trace =
             line(&text::plain(name), curve, position).with("yaxis", self.axis()).with("showlegend", legend);
         self.traces.push(trace);
@@ -119,7 +145,7 @@ impl<'a> Stack<'a> {
         let at = marked.rows.iter().filter_map(|row| row.checked_sub(1));
         let points = at.filter_map(|row| Some((*self.time.get(row)?, *values.get(row)?)));
         let points = points.filter(|(_, value)| value.is_finite());
-        let (x, y): (Vec<f64>, Vec<f64>) = points.map(|(x, y)| (significant(x), significant(y))).unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = points.map(|(x, y)| (self.at(x), significant(y))).unzip();
         if x.is_empty() {
             return;
         }
@@ -151,7 +177,11 @@ impl<'a> Stack<'a> {
             top = below;
         }
         let anchor = self.axis();
-        layout = layout.with("xaxis", axis("time [s]").with("anchor", anchor).with("exponentformat", "none"));
+        let clock = match self.start {
+            Some(_) => axis("time").with("type", "date"),
+            None => axis("time [s]").with("exponentformat", "none"),
+        };
+        layout = layout.with("xaxis", clock.with("anchor", anchor));
         let (shapes, labels) = self.shades(shades);
         layout = layout.with("shapes", shapes).with("annotations", labels);
         chart(title, words, all + HEIGHTS[2], self.traces, layout)
@@ -169,7 +199,7 @@ impl<'a> Stack<'a> {
             else {
                 continue;
             };
-            let (first, last) = (significant(*first), significant(*last));
+            let (first, last) = (self.at(*first), self.at(*last));
             if !(first.is_finite() && last.is_finite()) {
                 continue;
             }

@@ -119,6 +119,7 @@ impl LogJob {
             missing: log.missing.clone(),
             values: log.value.iter().map(|text| value(text)).collect::<Result<_, _>>()?,
             encoding: encoding.transpose()?,
+            sheet: log.sheet.clone(),
             time_format: clock.time_format.clone(),
             time_unit: clock.time_unit.as_deref().map(unit).transpose()?,
             time_zone: clock.time_zone.clone(),

@@ -505,7 +505,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();
     let columns = find_all(names, header).map_err(bad)?;
-    let mut taken = None;
+    let (mut taken, mut words) = (None, Vec::new());
     let (clock, found) = match &job.clock {
         Clock::Unknown { resample } => {
             let found = free_clocks(reader, &columns);
@@ -527,7 +527,18 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
                         "no column is a clock, and --resample needs one; name it with --time".to_owned()
                     ));
                 }
-                (None, None) => job.clock.clone(),
+                (None, None) => {
+                    let meant = reader.called_clocks().into_iter().find(|column| !columns.contains(column));
+                    words.extend(meant.map(|column| {
+                        let name = &header[column];
+                        format!(
+                            "{file}: column '{name}' is called as a clock is, or holds dates, but its times do not rise or are not \
+                             understood: rows are taken to be evenly apart; --time {name} says what is wrong with them, and \
+                             --time-format how they are written"
+                        )
+                    }));
+                    job.clock.clone()
+                }
             };
             (clock, found)
         }
@@ -549,7 +560,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
         selection: Selection { columns, time, date },
         clock,
         note: taken.filter(|_| !job.quiet),
-        words: Vec::new(),
+        words,
     })
 }
 

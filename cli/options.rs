@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 94] = [
+pub(crate) const OPTIONS: [&str; 95] = [
     "alarm",
     "alpha",
     "alphas",
@@ -75,6 +75,7 @@ pub(crate) const OPTIONS: [&str; 94] = [
     "sample-time",
     "scale",
     "select",
+    "sheet",
     "signal",
     "skip-rows",
     "split",

@@ -65,7 +65,7 @@ const TABLE: House = House {
     floors: &[
         &["blanks", "decimal", "error", "lines", "memory", "record", "words"],
         &["dialect", "mailbox", "number", "source"],
-        &["block", "names", "time"],
+        &["block", "names", "spreadsheet", "time"],
         &["names_of_times", "zone"],
         &["clock"],
         &["shape"],

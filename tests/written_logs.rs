@@ -134,6 +134,20 @@ fn clocks_are_found_and_understood() {
     ] {
         is_the_plant(name, &log, "", told);
     }
+    let durations = written("time,u,y\n", |t, u, y| {
+        let t = 23.0 * 3600.0 + 1800.0 + t;
+        plain(format!("{:02}:{:02}:{:02}", (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t as u32 % 60), u, y)
+    });
+    is_the_plant("durations", &durations, "", "the clock is column 'time'");
+    let minutes =
+        written("time,u,y\n", |t, u, y| plain(format!("{:02}:{:04.1}", (t / 60.0) as u32, t % 60.0), u, y));
+    is_the_plant("minutes and seconds", &minutes, "", "the clock is column 'time'");
+    let stamps = written("sec,nanosec,u,y\n", |t, u, y| plain(format!("{},0", epoch(t)), u, y));
+    is_the_plant("sec", &stamps, "", "the clock is column 'sec'");
+    // What is called a clock and is none is told.
+    let unsorted = written("time,u,y\n", |t, u, y| plain(((7.0 * t) % 1000.0).to_string(), u, y));
+    let run = Folder::with_log(unsorted).done("fit log.csv --structure p1");
+    assert!(run.stderr.contains("column 'time' is called as a clock is"), "{}", run.stderr);
     let minutes = written("elapsed,u,y\n", |t, u, y| plain((t / 60.0).to_string(), u, y));
     is_the_plant("minutes", &minutes, "--time-unit min", "");
     // A clock without a unit is read in seconds, and questioned where that makes no sense.
@@ -211,6 +225,12 @@ fn heads_and_notations_are_understood() {
             ),
             "",
             "the clock is column 'TIMESTAMP'",
+        ),
+        (
+            "fixed width",
+            written(" Time (s)    u     y\n", |t, u, y| format!("  {t:.3E}  {u:.3E}  {y:.6E}")),
+            "",
+            "the clock is column 'Time (s)'",
         ),
         ("blanks", written("t u y\n", |t, u, y| format!("{t}   {u} \t{y:.4}")), "", "'t'"),
         (

@@ -84,6 +84,9 @@ pub(crate) struct LogArguments {
     /// A word that stands for a number, such as auto=1, besides words for off and on
     #[arg(long, value_name = "WORD=NUMBER", allow_hyphen_values = true, help_heading = "Log format")]
     pub(crate) value: Vec<String>,
+    /// The sheet of a spreadsheet [default: the first that holds numbers]
+    #[arg(long, value_name = "NAME", help_heading = "Log format")]
+    pub(crate) sheet: Option<String>,
     /// The text's encoding, such as latin1 [default: UTF-8, or what a byte-order mark says]
     #[arg(long, value_name = "NAME", help_heading = "Log format")]
     pub(crate) encoding: Option<String>,

@@ -103,9 +103,12 @@ impl InspectJob {
             }
         }
         let log = &arguments.log;
-        for (name, value) in
-            [("--delimiter", &log.delimiter), ("--comment", &log.comment), ("--encoding", &log.encoding)]
-        {
+        for (name, value) in [
+            ("--delimiter", &log.delimiter),
+            ("--comment", &log.comment),
+            ("--encoding", &log.encoding),
+            ("--sheet", &log.sheet),
+        ] {
             if let Some(value) = value {
                 option(name, value);
             }

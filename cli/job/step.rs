@@ -66,6 +66,7 @@ impl StepArguments {
             ("missing", !log.missing.is_empty()),
             ("value", !log.value.is_empty()),
             ("encoding", log.encoding.is_some()),
+            ("sheet", log.sheet.is_some()),
         ];
         let of_tests = [
             ("input", self.input.is_some()),

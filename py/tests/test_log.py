@@ -109,7 +109,7 @@ def test_a_clock_may_be_uneven_where_it_may() -> None:
         ({"y": Y, "time": Y[:4]}, "there are 4 time stamps for 5 rows"),
         ({"y": Y, "time": Y[::-1]}, "time goes back"),
         ({"y": Y, "time": [0, 1, 2, 2.7, 4]}, "the log is not uniform; resample it every 1 s"),
-        ({"y": Y, "time": Y, "resample": (1.0, "cubic")}, "resample: 'cubic' is neither"),
+        ({"y": Y, "time": Y, "resample": (1.0, "cubic")}, "resample: 'cubic' is none of"),
         ({"y": Y, "time": Y, "resample": (-1.0, "hold")}, "resample: -1 is not a positive"),
         ({"y": Y, "time": Y, "resample": (1.0, "hold", "raw")}, "resample: 'raw' is not 'unfiltered'"),
         ({"y": [1.0], "time": [0.0]}, "one row has no time step"),
@@ -240,15 +240,15 @@ def test_data_frames_are_logs(library: Any) -> None:
 
 def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
     path = tmp_path / "log; a.csv"
-    path.write_text("# made by hand\nzeit;ventil;druck\n0;1,5;2\n1;0;-\n2;1;4\n", encoding="utf-8")
+    path.write_text("# made by hand\nzeit;ventil;druck\n0;1,5;2\n1;0;-x-\n2;1;4\n", encoding="utf-8")
     log = th.read_csv(
-        path, inputs="ventil", output="druck", time="zeit", delimiter=";", decimal_comma=True, comment="#", missing="-"
+        path, inputs="ventil", output="druck", time="zeit", delimiter=";", decimal_comma=True, comment="#", missing="-x-"
     )
     assert log == th.Log([2, np.nan, 4], {"ventil": [1.5, 0, 1]}, time=[0, 1, 2], output_name="druck")
-    assert th.read_csv(str(path), inputs=[], output="druck", delimiter=";", comment="#", missing=["-"]).inputs == []
+    assert th.read_csv(str(path), inputs=[], output="druck", delimiter=";", comment="#", missing=["-x-"]).inputs == []
     with pytest.raises(FileNotFoundError):
         th.read_csv(tmp_path / "none.csv")
-    with pytest.raises(ValueError, match=r"log; a\.csv:4:5: column 'druck'.*missing='-'"):
+    with pytest.raises(ValueError, match=r"log; a\.csv:4:5: column 'druck'.*missing='-x-'"):
         th.read_csv(path, inputs="ventil", output="druck", delimiter=";", decimal_comma=True, comment="#")
     with pytest.raises(ValueError, match="name the output with output"):
         th.read_csv(path, delimiter=";", comment="#")
@@ -256,13 +256,12 @@ def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
         th.read_csv(path, delimeter=";")  # type: ignore[call-arg]
 
 
-def test_what_looks_like_a_clock_is_a_word_of_warning(tmp_path: Path) -> None:
+def test_what_is_found_in_a_file_is_told(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,u,y\n0,1,0\n1,0,1\n")
-    with pytest.warns(UserWarning, match="looks like a clock; time t would use it"):
-        th.read_csv(path)
+    assert repr(th.read_csv(path)) == "Log(2 rows, inputs u, output y, sample time 1.0 s by column 't')"
     path.write_text("0,1,2\n1,0,1\n2,0,3\n")
-    with pytest.warns(UserWarning, match="read it with header=False"):
+    with pytest.warns(UserWarning, match="header=False reads it as a row"):
         th.read_csv(path, inputs="1", output="2")
     with pytest.raises(ValueError, match="name the inputs with inputs"):
         th.read_csv(path, output="0")
@@ -344,8 +343,7 @@ def test_files_in_columns(tmp_path: Path) -> None:
         assert "column 4 ('note') is left out: it holds no numbers" in th.inspect(path, time="when").warnings
         with pytest.raises(ValueError, match="column 'note' holds texts"):
             th.read_log(path, inputs="note", time="when")
-        with pytest.warns(UserWarning, match="column 'when' looks like a clock"):
-            th.read_log(path)
+        assert th.read_log(path).sample_time == expected.sample_time
         with pytest.raises(ValueError, match="--delimiter|delimiter"):
             th.read_csv(path, delimiter=";")
     short = tmp_path / "short.parquet"

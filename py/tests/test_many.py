@@ -114,11 +114,11 @@ def test_any_function_of_a_log_will_do() -> None:
 
 def test_warnings_stand_in_the_rows_and_nowhere_else(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("t,u,y\n" + "".join(f"{row},{u},{y}\n" for row, (u, y) in enumerate(zip(MOTOR["u"], MOTOR["y"]))))
+    path.write_text("u,y\nV,rad/s\n" + "".join(f"{u},{y}\n" for u, y in zip(MOTOR["u"], MOTOR["y"])))
     fits = th.fit_many([path], th.arx, na=1, nb=1)
-    assert "looks like a clock" in fits.rows[0]["warnings"]
+    assert "line 2 is read as units" in fits.rows[0]["warnings"]
     assert not recwarn.list
-    with pytest.warns(UserWarning, match="looks like a clock"):
+    with pytest.warns(UserWarning, match="line 2 is read as units"):
         th.read_csv(path)
 
 

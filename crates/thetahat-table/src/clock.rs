@@ -14,7 +14,7 @@ pub(super) const SHEET_DAYS: i128 = 25_569 * 86_400 * 1_000_000_000;
 /// A step of a clock without a unit that is longer, or shorter, may have another unit: in seconds.
 const LONGEST_STEP: f64 = 1000.0;
 const SHORTEST_STEP: f64 = 5e-5;
-/// A clock may stand still, or go back, in this share of the rows.
+/// A clock may go back in this share of the rows, or once.
 const BACK: f64 = 0.05;
 
 /// The first values of a column, as far as they may be times.
@@ -43,13 +43,24 @@ const TIMES: [&str; 4] = ["%H:%M:%S%.f", "%H:%M", "%I:%M:%S %p", "%I:%M %p"];
 pub(super) fn is_clock(name: &str, unit: Option<&str>, sample: &Sample, first: bool) -> bool {
     let Sample { numbers, dates } = sample;
     if !dates.is_empty() {
-        return numbers.is_empty() && (dates.len() == 1 || rises(&seconds(dates).unwrap_or_default()));
+        let durations =
+            || dates.iter().map(|date| time::duration(date.as_bytes())).collect::<Option<Vec<f64>>>();
+        let seconds = seconds(dates).or_else(durations).unwrap_or_default();
+        return numbers.is_empty() && (dates.len() == 1 || rises(&seconds));
     }
     let unnamed = first && (name.is_empty() || name.starts_with("Unnamed"));
     let named = names_of_times::of(name, unit).is_some();
     // A table without a name for its index has the numbers of its rows there.
     let counts = numbers.iter().enumerate().all(|(row, value)| *value == row as f64 + numbers[0]);
     (named || unnamed && !counts && numbers.len() > 1) && rises(numbers)
+}
+
+/// Whether a column may be meant as a clock: it is called as times are, or holds dates that change.
+pub(super) fn is_called_clock(name: &str, unit: Option<&str>, sample: &Sample) -> bool {
+    let Sample { numbers, dates } = sample;
+    let changes =
+        dates.windows(2).any(|pair| pair[0] != pair[1]) || numbers.windows(2).any(|pair| pair[0] != pair[1]);
+    changes && (names_of_times::of(name, unit).is_some() || numbers.is_empty())
 }
 
 /// Whether all dates are days, without a time.
@@ -70,7 +81,8 @@ pub(super) fn are_times_of_day(sample: &Sample) -> bool {
 fn rises(values: &[f64]) -> bool {
     let back = values.windows(2).filter(|pair| pair[1] < pair[0]).count();
     let on = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
-    !values.is_empty() && back as f64 <= BACK * values.len() as f64 && (on > 0 || values.len() == 1)
+    let few = back as f64 <= (BACK * values.len() as f64).max(1.0);
+    !values.is_empty() && few && (on > 0 || values.len() == 1)
 }
 
 /// Dates as seconds since 1970, in the first format that all of them have.
@@ -138,8 +150,18 @@ fn dates(dates: &[String]) -> Result<Option<Recognised>, String> {
     // Where not one of them rises, the order of the rows says nothing.
     let fitting = if rising.is_empty() { found.iter().collect() } else { rising };
     let shown = |format: &Option<String>| format.clone().unwrap_or_default();
+    let durations = dates.iter().all(|date| time::duration(date.as_bytes()).is_some());
     match fitting.as_slice() {
+        // More hours than a day has, or more minutes than an hour.
+        [] if durations => Ok(Some(Recognised { written: Written::Durations, told: None })),
         [] => Ok(None),
+        [only] if only.as_deref() == Some("%H:%M") => Ok(Some(Recognised {
+            written: Written::Dates((*only).clone()),
+            told: Some(format!(
+                "times such as {} are read as hours and minutes; give them with seconds if they are minutes and seconds",
+                dates.first().map_or("", String::as_str)
+            )),
+        })),
         [only] => Ok(Some(Recognised { written: Written::Dates((*only).clone()), told: None })),
         [one, other, ..] if same_steps(dates, one, other) => Ok(Some(Recognised {
             written: Written::Dates((*one).clone()),

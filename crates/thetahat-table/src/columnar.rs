@@ -24,7 +24,7 @@ use arrow_schema::Schema;
 use super::error::{Error, escaped, shortened};
 use super::lines::Lines;
 use super::mailbox::{Event, Mailbox, Message, Waker};
-use super::source::{Bytes, Format};
+use super::source::{Bytes, Columnar};
 use super::time::Calendar;
 use super::{Header, Options, Selection, Table};
 use batches::{Batches, Opened};
@@ -118,7 +118,12 @@ impl Columns {
 
 impl ColumnarReader {
     /// Reads what the columns are.
-    pub(super) fn open(path: &Path, bytes: Bytes, format: Format, options: &Options) -> Result<Self, Error> {
+    pub(super) fn open(
+        path: &Path,
+        bytes: Bytes,
+        format: Columnar,
+        options: &Options,
+    ) -> Result<Self, Error> {
         let file = bytes.name().to_owned();
         if let Some(option) = text_option(options) {
             return Err(Error::data(

@@ -1,12 +1,16 @@
 //! Logs of all formats, behind one front.
 
+#[cfg(feature = "spreadsheets")]
+use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::error::Error;
 use super::mailbox::{Event, Waker};
 use super::reader::{SIZES, TextReader};
-use super::source::{Bytes, Source};
+use super::source::{Bytes, Format, Source};
+#[cfg(feature = "spreadsheets")]
+use super::spreadsheet::{self, Sheet};
 use super::stream::TextStream;
 use super::time::Calendar;
 use super::zone::Zone;
@@ -52,16 +56,28 @@ impl Reader {
         let file = bytes.name().to_owned();
         let zone = options.time_zone.as_deref().and_then(|name| Zone::of(name).ok());
         let any = match bytes.format {
+            #[cfg(feature = "spreadsheets")]
+            Some(Format::Spreadsheet) => {
+                let Sheet { text: cells, words } = spreadsheet::read(bytes, options)?;
+                let total = Some(cells.len() as u64);
+                let cells = Bytes::new(&file, Cursor::new(cells), total)?;
+                let mut reader = text(Source::new(cells, None))?;
+                reader.tell(&words);
+                Ok(AnyReader::Text(Box::new(reader)))
+            }
+            _ if options.sheet.is_some() => {
+                Err(Error::data(&file, None, "`sheet` is for spreadsheets, and this is none; leave it out"))
+            }
             None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?))),
             #[cfg(feature = "columnar")]
-            Some(format) => {
+            Some(Format::Columnar(format)) => {
                 Ok(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?)))
             }
-            #[cfg(not(feature = "columnar"))]
+            #[cfg(not(all(feature = "columnar", feature = "spreadsheets")))]
             Some(_) => Err(Error::data(
                 bytes.name(),
                 None,
-                "is a Parquet or Arrow file, which this program was built without; build it with the feature columnar, or \
+                "is in a format that this program was built without; build it with the features columnar and spreadsheets, or \
                  write CSV",
             )),
         };
@@ -110,6 +126,15 @@ impl Reader {
             AnyReader::Columnar(reader) => {
                 reader.times().into_iter().map(|time| ClockColumns { time, date: None }).collect()
             }
+        }
+    }
+
+    /// The columns of a text that are called as clocks are, or hold dates: without being a clock, they may be meant as one.
+    pub fn called_clocks(&self) -> Vec<usize> {
+        match &self.any {
+            AnyReader::Text(reader) => reader.called_clocks(),
+            #[cfg(feature = "columnar")]
+            AnyReader::Columnar(_) => Vec::new(),
         }
     }
 

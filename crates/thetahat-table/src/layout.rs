@@ -92,6 +92,17 @@ impl Layout {
         found
     }
 
+    /// The columns that are called as clocks are, or hold dates, whether they are clocks or not.
+    pub(super) fn called_clocks(&self) -> Vec<usize> {
+        let is_called = |column: &usize| {
+            let own = self.columns.get(*column);
+            own.is_some_and(|own| {
+                clock::is_called_clock(&self.names[*column], self.unit(*column), &own.sample)
+            })
+        };
+        (0..self.width()).filter(is_called).collect()
+    }
+
     /// A column as messages call it.
     pub(super) fn column(&self, index: usize) -> String {
         match self.names.get(index) {

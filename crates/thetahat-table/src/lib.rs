@@ -1,4 +1,4 @@
-//! Logs in tables, read into columns of numbers: text (CSV), Parquet, and Arrow IPC files and streams.
+//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, Parquet, and Arrow IPC files and streams.
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
 //! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks
@@ -59,6 +59,8 @@ mod record;
 mod rows;
 mod shape;
 mod source;
+#[cfg(feature = "spreadsheets")]
+mod spreadsheet;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -104,6 +106,8 @@ pub struct Options {
     pub missing: Vec<String>,
     /// Words that stand for numbers, besides pairs such as `off` and `on`.
     pub values: Vec<(String, f64)>,
+    /// The sheet of a spreadsheet; the first that holds numbers, if it is not given.
+    pub sheet: Option<String>,
     /// The encoding of the text, if it is neither UTF-8 nor marked as UTF-16.
     pub encoding: Option<&'static encoding_rs::Encoding>,
     /// How times are written, in the manner of strptime; recognised from the first rows if it is not given.

@@ -40,8 +40,9 @@ const NAMES: [&str; 34] = [
     "x_value",
 ];
 /// The same where the name is a unit.
-const UNITS_AS_NAMES: [&str; 9] = [
+const UNITS_AS_NAMES: [&str; 10] = [
     "seconds",
+    "sec",
     "secs",
     "millis",
     "milliseconds",

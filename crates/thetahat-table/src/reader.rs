@@ -120,6 +120,10 @@ impl TextReader {
         reader.told = shape.words.iter().map(|words| reader.layout.told(words)).collect();
         reader.pass(start)?;
         reader.read_head(shape.has_names, shape.left_out, shape.width)?;
+        if let Some(names) = shape.names {
+            reader.layout.names =
+                names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+        }
         Ok(reader)
     }
 
@@ -216,9 +220,21 @@ impl TextReader {
         (0..self.layout.width()).map(of).collect()
     }
 
+    /// Further words that the reader should know.
+    #[cfg(feature = "spreadsheets")]
+    pub(super) fn tell(&mut self, words: &[String]) {
+        let words = words.iter().map(|words| self.layout.told(words));
+        self.told.splice(0..0, words);
+    }
+
     /// The columns that are clocks by their names and their first values.
     pub(super) fn times(&self) -> Vec<ClockColumns> {
         self.layout.clocks()
+    }
+
+    /// The columns that are called as clocks are, or hold dates.
+    pub(super) fn called_clocks(&self) -> Vec<usize> {
+        self.layout.called_clocks()
     }
 
     /// The columns of which the name is not UTF-8 and cannot be shown.

@@ -33,6 +33,8 @@ pub(super) struct Shape {
     /// Whether there are names, and how many lines between them and the first row are left out.
     pub(super) has_names: bool,
     pub(super) left_out: usize,
+    /// The names, where a reader of rows would not find them so.
+    pub(super) names: Option<Vec<Vec<u8>>>,
     /// The number of fields in a row where names say otherwise: a last field may be a comment.
     pub(super) width: Option<usize>,
     pub(super) decimal_comma: bool,
@@ -279,6 +281,7 @@ impl Shape {
             line: head.line,
             has_names: head.has_names,
             left_out: head.left_out,
+            names: head.names,
             width: head.width,
             decimal_comma: false,
             grouped: false,
@@ -473,6 +476,7 @@ struct Head {
     left_out: usize,
     /// The first line that is a row.
     rows: usize,
+    names: Option<Vec<Vec<u8>>>,
     width: Option<usize>,
     comment: Option<u8>,
     units: Vec<String>,
@@ -486,7 +490,19 @@ impl Head {
         let has_names = options.header != Header::None;
         let rows = usize::from(has_names) + options.skip_rows;
         let (left_out, width, comment) = (options.skip_rows, None, None);
-        Self { start, line, has_names, left_out, rows, width, comment, units: Vec::new(), words: Vec::new() }
+        let names = None;
+        Self {
+            start,
+            line,
+            has_names,
+            left_out,
+            rows,
+            names,
+            width,
+            comment,
+            units: Vec::new(),
+            words: Vec::new(),
+        }
     }
 
     fn find(lines: &Lines<'_>, kinds: &[Option<Sort>], options: &Options) -> Result<Self, String> {
@@ -525,7 +541,9 @@ impl Head {
     fn without_names(self, lines: &Lines<'_>, kinds: &[Option<Sort>], first: usize) -> Self {
         let all = &lines.lines;
         if first == 0 && is_counting(&lines.fields(&all[0])) && all.len() > 1 {
-            return self;
+            let told =
+                "the first line counts the columns and is read as their names; `no-header` reads it as a row";
+            return Self { words: vec![told.to_owned()], ..self };
         }
         // What is above may be a title; if it has several fields, it is names that do not go with the rows.
         let several = all[..first].iter().any(|line| !line.is_marked() && line.sorts.len() > 1);
@@ -572,6 +590,8 @@ impl Head {
                 line.number
             ));
         }
+        let wide = Some(lines.wide_names(line))
+            .filter(|wide| line.sorts.len() != kinds.len() && wide.len() == kinds.len());
         let marker = line.marker(lines);
         let own = line.sorts.len() - usize::from(marker > 0 && lines.dialect.blanks);
         let is_short = own == kinds.len() + 1;
@@ -591,6 +611,7 @@ impl Head {
             } else {
                 None
             },
+            names: wide,
             comment,
             units,
             words,
@@ -618,6 +639,21 @@ impl Lines<'_> {
     fn end_without_value(&self, width: usize, first: usize) -> bool {
         let mut rows = self.lines.iter().skip(first).filter(|line| line.sorts.len() == width);
         rows.all(|line| matches!(line.sorts.last(), Some(Sort::Missing | Sort::Word)))
+    }
+
+    /// The names of a line in which single blanks belong to them and longer runs separate, where blanks separate.
+    fn wide_names(&self, line: &Line) -> Vec<Vec<u8>> {
+        if !self.dialect.blanks {
+            return Vec::new();
+        }
+        let rest = &self.text[line.start..];
+        let mut own = rest[..memchr::memchr(b'\n', rest).unwrap_or(rest.len())].to_vec();
+        for place in 1..own.len() {
+            if own[place] == b'\t' && own[place - 1] != b' ' {
+                own[place] = b' ';
+            }
+        }
+        own.split(|byte| *byte == b'\t').map(|name| name.trim_ascii().to_vec()).collect()
     }
 
     /// Whether a line below the names can be one of units.
@@ -648,6 +684,7 @@ fn names(lines: &Lines<'_>, kinds: &[Option<Sort>], first: usize) -> Option<usiz
     let goes_with_rows = |line: &Line| {
         let own = line.sorts.len();
         own == width
+            || own > width && lines.wide_names(line).len() == width
             || own == width + 1
                 && (lines.ends_with_comments(line)
                     || line.is_marked() && line.marker(lines) > 0 && lines.dialect.blanks)

@@ -23,6 +23,15 @@ const PIECE: usize = 1 << 16;
 /// What the first bytes of a log say that it is, if it is no text.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub(super) enum Format {
+    /// Columns of values in binary.
+    Columnar(Columnar),
+    /// A zip file, as spreadsheets are today, and the container of those before.
+    Spreadsheet,
+}
+
+/// The formats of columns of values in binary.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Columnar {
     Parquet,
     EncryptedParquet,
     ArrowFile,
@@ -32,12 +41,14 @@ pub(super) enum Format {
 
 impl Format {
     /// The first bytes of each. Those of a stream are the mark before each of its messages, and no text in any encoding.
-    const MARKS: [(&[u8], Self); 5] = [
-        (b"PAR1", Self::Parquet),
-        (b"PARE", Self::EncryptedParquet),
-        (b"ARROW1", Self::ArrowFile),
-        (&[0xff; 4], Self::ArrowStream),
-        (b"FEA1", Self::Feather1),
+    const MARKS: [(&[u8], Self); 7] = [
+        (b"PAR1", Self::Columnar(Columnar::Parquet)),
+        (b"PARE", Self::Columnar(Columnar::EncryptedParquet)),
+        (b"ARROW1", Self::Columnar(Columnar::ArrowFile)),
+        (&[0xff; 4], Self::Columnar(Columnar::ArrowStream)),
+        (b"FEA1", Self::Columnar(Columnar::Feather1)),
+        (b"PK\x03\x04", Self::Spreadsheet),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Self::Spreadsheet),
     ];
 
     /// The format that begins with these bytes.
@@ -133,7 +144,7 @@ impl Bytes {
     }
 
     /// The bytes themselves.
-    #[cfg(feature = "columnar")]
+    #[cfg(any(feature = "columnar", feature = "spreadsheets"))]
     pub(super) fn into_reader(self) -> Box<dyn Read + Send> {
         self.bytes
     }

@@ -117,6 +117,8 @@ pub(super) enum Clock {
     Seconds,
     /// Numbers in another unit, as they are.
     Numbers(Unit),
+    /// Hours, minutes and seconds, as they are.
+    Durations,
     /// Numbers in a unit, returned as seconds since the first one.
     Since {
         unit: Unit,
@@ -144,6 +146,8 @@ pub(super) enum Written {
     Since(Unit, i128),
     /// ISO 8601, or a format in the manner of strptime.
     Dates(Option<String>),
+    /// Hours, minutes and seconds since the beginning, as in 27:05:10.5, or minutes and seconds.
+    Durations,
 }
 
 /// What times are, besides seconds.
@@ -231,6 +235,8 @@ impl Clock {
                     .map_err(|_| format!("{} is no time since 1970 in {}", quoted(field), unit.name()))?;
                 Ok(Self::Since { unit: *unit, first, whole, instant })
             }
+            Written::Durations if duration(field).is_some() => Ok(Self::Durations),
+            Written::Durations => Self::decide(field, None, numbers),
             Written::Dates(format) => Self::decide(field, format.as_deref(), numbers),
         }
     }
@@ -238,7 +244,7 @@ impl Clock {
     /// The first time in ISO 8601: as it is written if it is that. None of times that are mere numbers.
     pub(super) fn start(&self, field: &[u8]) -> Option<String> {
         match self {
-            Self::Seconds | Self::Numbers(_) => None,
+            Self::Seconds | Self::Numbers(_) | Self::Durations => None,
             Self::Since { unit: Unit::Days, instant, .. } => Some(civil(*instant)),
             Self::Since { instant, .. } => Some(instant.to_string()),
             Self::Calendar { format: None, .. } => Some(String::from_utf8_lossy(field).into_owned()),
@@ -272,12 +278,12 @@ impl Clock {
             }
             _ => instant(start.as_bytes(), None),
         };
-        if matches!(self, Self::Seconds | Self::Numbers(_)) {
+        if matches!(self, Self::Seconds | Self::Numbers(_) | Self::Durations) {
             return Ok(self);
         }
         let from = from()?;
         Ok(match self {
-            Self::Seconds | Self::Numbers(_) => self,
+            Self::Seconds | Self::Numbers(_) | Self::Durations => self,
             Self::Calendar { format, .. } => Self::Calendar { format, first: from },
             Self::Since { unit, first, instant, .. } => {
                 let ahead =
@@ -306,6 +312,9 @@ impl Clock {
             _ if numbers.is_missing(field) => Err(MISSING.to_owned()),
             Self::Seconds => number(field, numbers),
             Self::Numbers(unit) => Ok(unit.seconds(number(field, numbers)?)),
+            Self::Durations => duration(field).ok_or_else(|| {
+                format!("{} is no time as in 27:05:10.5, as the first ones are; correct it", quoted(field))
+            }),
             Self::Since { unit, first, whole, .. } => match (whole_number(field), whole) {
                 // Whole numbers are exact: nanoseconds since 1970 have more digits than a number has.
                 (Some(now), Some(first)) => Ok(unit.seconds((i128::from(now) - i128::from(*first)) as f64)),
@@ -334,6 +343,21 @@ fn is_first_day(instant: Timestamp) -> bool {
 /// An instant as the clocks on a wall show it that have no zone.
 fn civil(instant: Timestamp) -> String {
     Offset::UTC.to_datetime(instant).to_string()
+}
+
+/// Hours, minutes and seconds with colons between them, or minutes and seconds, in seconds.
+pub(super) fn duration(field: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(field).ok()?;
+    let (before, seconds) = text.rsplit_once(':')?;
+    let (hours, minutes) = before.split_once(':').unwrap_or(("0", before));
+    let whole = |text: &str, below: Option<u32>| {
+        let number: u32 = text.parse().ok().filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))?;
+        below.is_none_or(|below| number < below).then_some(f64::from(number))
+    };
+    let below = before.contains(':').then_some(60);
+    let plain = seconds.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.' || byte == b',');
+    let seconds: f64 = seconds.replace(',', ".").parse().ok().filter(|seconds| plain && *seconds < 60.0)?;
+    Some(3600.0 * whole(hours, None)? + 60.0 * whole(minutes, below)? + seconds)
 }
 
 /// A number that has nothing but digits.

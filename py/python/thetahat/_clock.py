@@ -311,6 +311,17 @@ def _free(name: Any, columns: dict[str, Any]) -> Any:
     return name
 
 
+def labels_from(start: str, seconds: _numbers.Array, name: Any) -> Labels | None:
+    """Rows of a file, so many seconds after a start in ISO 8601; None where that is a time of day without a date."""
+    found = ISO_8601.fullmatch(start.replace(",", "."))
+    if found is None:
+        return None
+    first = read("time", [start]).values[0].astype("datetime64[ns]")
+    instants = first + np.round(seconds * 1e9).astype("timedelta64[ns]")
+    zone = None if found.group(3) is None else datetime.timezone.utc
+    return Labels(instants, name, zone)
+
+
 def read(argument: str, values: Any, name: Any = None) -> Labels:
     """Times of any kind, copied: a log owns its data.
 

@@ -293,6 +293,7 @@ def inspect(
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
+    sheet: str | None = None,
     decimal_comma: bool | None = None,
     header: bool | int = True,
     skip_rows: int | None = None,
@@ -309,7 +310,7 @@ def inspect(
         The columns of a file that are inputs and output; without names all columns of numbers are inspected.
     time, sample_time, resample, time_format, time_unit, time_zone
         The clock of a file, see `thetahat.ReadOptions`.
-    delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
+    delimiter, comment, encoding, sheet, decimal_comma, header, skip_rows, missing, values
         How it is written, see `thetahat.ReadOptions`.
 
     Returns

@@ -382,6 +382,8 @@ class ReadOptions(TypedDict, total=False):
         The time zone of dates that have none, such as "Europe/Berlin".
     delimiter, comment, encoding : str
         The character between fields; the one that begins a comment; the file's encoding.
+    sheet : str
+        The sheet of a spreadsheet. Without it the first that holds numbers.
     decimal_comma : bool
         Whether numbers are written with a decimal comma. Without it the first rows say.
     header : bool or int
@@ -404,6 +406,7 @@ class ReadOptions(TypedDict, total=False):
     delimiter: str
     comment: str
     encoding: str
+    sheet: str
     decimal_comma: bool
     header: Union[bool, int]
     skip_rows: int

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from thetahat import _options, _said, _thetahat
-from thetahat._clock import Clock
+from thetahat._clock import Clock, labels_from
 from thetahat._log import Log, names_of
 from thetahat._options import Duration, ReadOptions, Resample
 
@@ -30,6 +30,7 @@ def read_csv(
     delimiter: str | None = None,
     comment: str | None = None,
     encoding: str | None = None,
+    sheet: str | None = None,
     decimal_comma: bool | None = None,
     header: bool | int = True,
     skip_rows: int | None = None,
@@ -50,7 +51,7 @@ def read_csv(
         Whether the steps of the clock have to be even. Models in equations take any.
     time, sample_time, resample, time_format, time_unit, time_zone
         The clock of the file, see `thetahat.ReadOptions`.
-    delimiter, comment, encoding, decimal_comma, header, skip_rows, missing, values
+    delimiter, comment, encoding, sheet, decimal_comma, header, skip_rows, missing, values
         How it is written, see `thetahat.ReadOptions`.
 
     Returns
@@ -150,7 +151,7 @@ def read_log(
     ...     frame.with_columns(pl.col("when").cast(pl.Datetime("ms"))).write_parquet(path)
     ...     log = th.read_log(path, time="when")
     >>> log
-    Log(3 rows, inputs u, output y, sample time 0.5 s by column 'when')
+    Log(3 rows, inputs u, output y, sample time 0.5 s by column 'when' from 1970-01-01T00:00:00)
     """
     return _read(path, inputs, output, locals(), uniform=uniform)
 
@@ -183,9 +184,12 @@ def _read(
         log = log.select([] if inputs is None else names_of("inputs", inputs), outputs)
     for note in notes:
         _said.warn(note, stacklevel=3)
-    time, _ = log.clock
+    time, start = log.clock
     said = "assumed" if time is None and options.get("sample_time") is None else "" if time is None else f"by column {time!r}"
-    return Log._of(log, Clock(said if options.get("resample") is None else f"{said}, resampled"))
+    said = said if options.get("resample") is None else f"{said}, resampled"
+    # Several logs have no common start.
+    times = None if start is None or log.boundaries else labels_from(start, log.time(), time)
+    return Log._of(log, Clock(said, times, column=True))
 
 
 def dc_motor() -> Log:

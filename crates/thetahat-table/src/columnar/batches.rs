@@ -18,7 +18,7 @@ use parquet::arrow::arrow_reader::{
 
 use super::super::error::{Error, escaped};
 use super::super::memory::Bound;
-use super::super::source::{Bytes, Format};
+use super::super::source::{Bytes, Columnar};
 use super::footer;
 use super::messages::{Blocks, Limits, Messages};
 
@@ -28,12 +28,12 @@ const PAGE_HEADER: u64 = 1 << 12;
 const BATCH: usize = 1 << 14;
 
 /// A format, with its article.
-pub(super) fn named(format: Format) -> &'static str {
+pub(super) fn named(format: Columnar) -> &'static str {
     match format {
-        Format::Parquet | Format::EncryptedParquet => "a Parquet file",
-        Format::ArrowFile => "an Arrow file",
-        Format::ArrowStream => "an Arrow stream",
-        Format::Feather1 => "a Feather file",
+        Columnar::Parquet | Columnar::EncryptedParquet => "a Parquet file",
+        Columnar::ArrowFile => "an Arrow file",
+        Columnar::ArrowStream => "an Arrow stream",
+        Columnar::Feather1 => "a Feather file",
     }
 }
 
@@ -68,33 +68,35 @@ impl Opened {
     pub(super) fn new(
         path: &Path,
         bytes: Bytes,
-        format: Format,
+        format: Columnar,
         bound: Option<Bound>,
     ) -> Result<(Self, SchemaRef), Error> {
         let name = bytes.name().to_owned();
         let refusal = |message: String| Err(Error::data(&name, None, message));
         match format {
-            Format::EncryptedParquet => {
+            Columnar::EncryptedParquet => {
                 refusal("this Parquet file is encrypted; write it without encryption".to_owned())
             }
-            Format::Feather1 => refusal(
+            Columnar::Feather1 => refusal(
                 "this is a Feather file of version 1; write it as version 2, which is an Arrow file"
                     .to_owned(),
             ),
-            Format::Parquet | Format::ArrowFile if path == Path::new("-") || bytes.progress().1.is_none() => {
+            Columnar::Parquet | Columnar::ArrowFile
+                if path == Path::new("-") || bytes.progress().1.is_none() =>
+            {
                 refusal(format!(
                     "{} is read from its end, where its directory is, so it cannot come through a pipe; name the file, or send an \
                  Arrow stream",
                     named(format)
                 ))
             }
-            Format::Parquet | Format::ArrowFile if bytes.is_gzip() => refusal(format!(
+            Columnar::Parquet | Columnar::ArrowFile if bytes.is_gzip() => refusal(format!(
                 "{} is read from its end, and this one was compressed as a whole; unpack it (gunzip)",
                 named(format)
             )),
-            Format::Parquet => Self::parquet(path, name, bound),
-            Format::ArrowFile => Self::file(path, name, Limits::new(bound)),
-            Format::ArrowStream => {
+            Columnar::Parquet => Self::parquet(path, name, bound),
+            Columnar::ArrowFile => Self::file(path, name, Limits::new(bound)),
+            Columnar::ArrowStream => {
                 let (bytes_read, total) = bytes.progress();
                 // A message begins with a few bytes each.
                 let bytes = BufReader::with_capacity(1 << 16, bytes.into_reader());

@@ -17,6 +17,8 @@ pub(crate) const GAP: f64 = 1.5;
 /// Where this part of the steps is longer, they are none: the log is one of two rates. Then a gap is longer than 1.5 of the step that
 /// all but a few have.
 const TWO_RATES: f64 = 1.0 / 3.0;
+/// And these are so many at least.
+const LONG_STEPS: f64 = 5.0;
 const FEW: f64 = 0.05;
 /// Steps may differ from their median by this fraction.
 pub(crate) const JITTER: f64 = 0.1;
@@ -670,7 +672,7 @@ pub(crate) fn gap_above(steps: &mut [f64], median: f64) -> f64 {
 
 /// The same by the number of steps above the limit for one rate, and by the step that all but a few have.
 pub(crate) fn gap_of(limit: f64, long: f64, steps: f64, most: impl FnOnce() -> f64) -> f64 {
-    if long > 0.0 && long >= TWO_RATES * steps { GAP * most() } else { limit }
+    if long >= LONG_STEPS && long >= TWO_RATES * steps { GAP * most() } else { limit }
 }
 
 /// The median time step of a clock that runs forward.

@@ -234,22 +234,25 @@ fn is_restart(now: f64, first: f64, usual: f64, calendar: Calendar) -> bool {
 /// That a time stands still or goes back, and what may be the cause.
 fn trouble(time: &[f64], row: usize, usual: f64) -> Error {
     let (before, now) = (time[row - 1], time[row]);
+    let count = |wrong: fn(&[f64]) -> bool| match time.windows(2).filter(|pair| wrong(pair)).count() {
+        1 => "once".to_owned(),
+        times => format!("{times} times"),
+    };
     let message = if now == before {
-        let times = time.windows(2).filter(|pair| pair[1] == pair[0]).count();
         format!(
-            "time repeats (at {now} s, and in {times} rows in all); keep one row for each time, or give `sample-time` if rows are \
-             evenly apart"
+            "time repeats (at {now} s; {} in all); keep one row for each time, or give `sample-time` if rows are evenly apart",
+            count(|pair| pair[1] == pair[0])
         )
     } else if (before - now - HOUR).abs() <= 2.0 * usual {
         format!(
             "time goes back by an hour (from {before} s to {now} s): if the clock was set, name its zone (`time-zone`)"
         )
     } else {
-        let times = time.windows(2).filter(|pair| pair[1] < pair[0]).count();
         format!(
-            "time goes back (from {before} s to {now} s, by {} s; in {times} rows in all); sort the log by time, or cut it there into \
-             two logs if the recorder was started again",
-            short(before - now)
+            "time goes back (from {before} s to {now} s, by {} s; {} in all); sort the log by time, or cut it there into two logs \
+             if the recorder was started again",
+            short(before - now),
+            count(|pair| pair[1] < pair[0])
         )
     };
     Error::Data { channel: None, row: Some(row + 1), message }
@@ -291,7 +294,7 @@ mod tests {
         let mut time = clock(50, 1.0);
         time[7] = 6.0;
         let error = mended(time, Calendar::None).unwrap_err().to_string();
-        assert!(error.contains("time repeats (at 6 s, and in 1 rows in all)"), "{error}");
+        assert!(error.contains("time repeats (at 6 s; once in all)"), "{error}");
     }
 
     #[test]
@@ -344,7 +347,7 @@ mod tests {
         // A log that is not sorted is none.
         let error = mended(vec![0.0, 1.0, 2.0, 5.0, 3.0, 4.0, 6.0], Calendar::None).unwrap_err().to_string();
         assert!(
-            error.contains("time goes back (from 5 s to 3 s, by 2 s; in 1 rows in all); sort the log"),
+            error.contains("time goes back (from 5 s to 3 s, by 2 s; once in all); sort the log"),
             "{error}"
         );
     }

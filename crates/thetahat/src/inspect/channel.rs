@@ -1,10 +1,34 @@
 //! The quality of one channel.
 
 use super::{ChannelQuality, moments, outliers, quantization, saturation};
-use crate::data::{Channel, Times};
+use crate::data::{Channel, Rows, Times};
 
 /// The first rows of outliers that are named.
 pub(super) const NAMED: usize = 20;
+
+/// A run of equal values of so many rows may be a sensor that is stuck.
+const STUCK: usize = 20;
+/// And so many times the longest other one.
+const ALONE: usize = 4;
+
+/// The rows of the longest run of equal values, where no other one comes near it: a channel that moves in steps has more of them.
+fn stuck(values: &[f64]) -> Option<Rows> {
+    let (mut row, mut longest, mut second) = (0, 0..0, 0);
+    for run in values.chunk_by(|left, right| left == right) {
+        let own = row..row + run.len();
+        row = own.end;
+        if run[0].is_nan() {
+            continue;
+        }
+        if own.len() > longest.len() {
+            (longest, second) = (own, longest.len());
+        } else {
+            second = second.max(own.len());
+        }
+    }
+    let alone = longest.len() >= STUCK.max(ALONE * second) && longest.len() < values.len();
+    alone.then(|| Rows::from_positions(&longest))
+}
 
 /// Looks at the values of a channel as they are. O(N log N); up to 32 bytes for each value besides the values themselves.
 pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> ChannelQuality {
@@ -20,6 +44,7 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> C
         missing: all.len() - count,
         repeated: all.windows(2).filter(|pair| pair[0] == pair[1]).count(),
         longest_hold: saturation::runs(all).map(|run| run.rows).max().unwrap_or(0),
+        stuck: stuck(all),
         ..ChannelQuality::without_values(&channel.name, role)
     };
     let mut sorted: Vec<f64> = all.iter().copied().filter(|value| !value.is_nan()).collect();

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Document;
-use crate::data::Source;
+use crate::data::{Rows, Source};
 use crate::document::document_methods;
 use crate::validate::feedback;
 
@@ -93,6 +93,9 @@ pub struct ChannelQuality {
     pub repeated: usize,
     /// The longest run of equal values, in rows.
     pub longest_hold: usize,
+    /// Its rows, where it is no habit of the channel to stand still, and another channel moves meanwhile: a sensor that is stuck.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stuck: Option<Rows>,
     /// The step of which all values are multiples, away from an offset, to rounding; none if there is none.
     pub quantization: Option<f64>,
     /// Segments at the largest or the smallest value.
@@ -237,6 +240,7 @@ impl ChannelQuality {
             trend_share: None,
             repeated: 0,
             longest_hold: 0,
+            stuck: None,
             quantization: None,
             saturation: None,
             outliers: Vec::new(),
@@ -252,7 +256,32 @@ impl ChannelQuality {
     }
 }
 
+/// An input that changes so few times is a step test.
+pub(super) const FEW_CHANGES: f64 = 5.0;
+/// Below this confidence a delay is worth a warning.
+pub(super) const UNSURE: f64 = 0.5;
+
 impl Inspection {
+    /// How many times an input changes.
+    pub(super) fn changes(&self, input: &str) -> f64 {
+        let pairs = self.log.rows.len().saturating_sub(1) as f64;
+        self.excitation.iter().find(|of| of.input == input).map_or(0.0, |of| of.changes * pairs)
+    }
+
+    /// Takes back what a few changes of an input cannot show: they follow what they will, and one response is no sample of delays.
+    pub(super) fn doubt_steps(&mut self) {
+        let few: Vec<String> = self.excitation.iter().map(|of| of.input.clone()).collect();
+        let few: Vec<String> = few.into_iter().filter(|input| self.changes(input) <= FEW_CHANGES).collect();
+        for feedback in self.feedback.iter_mut().filter(|of| few.contains(&of.input)) {
+            (feedback.p_value, feedback.explained, feedback.found) = (None, None, false);
+        }
+        for delay in self.delays.iter_mut().filter(|of| few.contains(&of.input)) {
+            if delay.confidence.is_some_and(|confidence| confidence < UNSURE) {
+                (delay.nk, delay.confidence) = (None, None);
+            }
+        }
+    }
+
     /// Gives inputs that are the same as another one its delay.
     pub(super) fn share_delays(&mut self) {
         for of in &self.excitation {

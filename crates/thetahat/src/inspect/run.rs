@@ -122,10 +122,20 @@ fn of_the_rows(
     plan: &InspectionPlan,
 ) -> Result<Inspection, Error> {
     let rows = check(channels)?;
-    let quality: Vec<ChannelQuality> = channels
+    let mut quality: Vec<ChannelQuality> = channels
         .par_iter()
         .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), times))
         .collect();
+    // Where everything stands still, nothing is stuck.
+    let moves = |rows: &Rows, but: usize| {
+        let others = channels.iter().enumerate().filter(|(place, _)| *place != but);
+        let moves =
+            |values: &[f64]| values[rows.positions()].windows(2).filter(|pair| pair[0] != pair[1]).count();
+        others.map(|(_, channel)| 2 * moves(&channel.values)).max().is_some_and(|twice| twice > rows.len())
+    };
+    for (place, channel) in quality.iter_mut().enumerate() {
+        channel.stuck = channel.stuck.filter(|rows| moves(rows, place));
+    }
     described(quality, rows, ticks, source, plan)
 }
 
@@ -259,6 +269,7 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
             )
         }));
     }
+    inspection.doubt_steps();
     inspection.share_delays();
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! What a careful reader should know, in plain words.
 
 use super::clock::Ticks;
+use super::inspection::{FEW_CHANGES, UNSURE};
 use super::{ChannelQuality, Inspection, InspectionPlan};
 use crate::data::Interpolation;
 use crate::figures::{fixed, short};
@@ -11,12 +12,8 @@ const TREND: f64 = 0.25;
 const COARSE: f64 = 0.25;
 /// An input that excites no more than this many orders limits the model.
 const POOR: usize = 10;
-/// An input that changes so few times is a step test.
-const FEW_CHANGES: f64 = 5.0;
 /// Rows that a sentence lists.
 const LISTED: usize = 5;
-/// Below this confidence a delay is worth a warning.
-const UNSURE: f64 = 0.5;
 /// Rows from which a fit has a chance.
 const FEW_ROWS: usize = 50;
 
@@ -100,6 +97,13 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
             listed.join(", ")
         ));
     }
+    if let Some(stuck) = channel.stuck {
+        say(format!(
+            "stands still in rows {}..{} while others move: where the sensor was stuck, empty these fields",
+            stuck.first(),
+            stuck.last()
+        ));
+    }
     if let Some(saturation) = channel.saturation {
         for (rows, which) in [(saturation.low, "smallest"), (saturation.high, "largest")] {
             if rows > 0 {
@@ -132,8 +136,7 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
     }
     for excitation in &inspection.excitation {
         let name = &excitation.input;
-        let pairs = inspection.log.rows.len().saturating_sub(1) as f64;
-        let changes = excitation.changes * pairs;
+        let changes = inspection.changes(name);
         if excitation.highest == 0 {
             words.push(format!("input '{name}' has too few rows in a segment to tell what it excites"));
         } else if excitation.order == 0 {
@@ -142,7 +145,8 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
             ));
         } else if changes <= FEW_CHANGES {
             words.push(format!(
-                "input '{name}' changes {changes:.0} time{} only: what a step shows is seen once and not averaged",
+                "input '{name}' changes {changes:.0} time{} only: what a step shows is seen once and not averaged, and whether the \
+                 input follows the output cannot be told",
                 plural(changes.round() as usize)
             ));
         } else if excitation.order <= POOR.min(excitation.highest) && excitation.order < excitation.highest {
@@ -185,6 +189,9 @@ pub(super) fn of_the_dynamics(inspection: &Inspection, plan: &InspectionPlan) ->
         words.push("there is no input: only a time series model can be fitted".to_owned());
     }
     for delay in inspection.delays.iter().filter(|delay| delay.nk.is_none()) {
+        if inspection.changes(&delay.input) <= FEW_CHANGES {
+            continue;
+        }
         // Of an input that excites nothing that was said.
         if inspection.excitation.iter().any(|of| of.input == delay.input && of.order > 0) {
             words.push(format!(

@@ -238,6 +238,7 @@ impl Dynamics {
         for (input, delay) in inspection.delays.iter_mut().enumerate() {
             delay.scale(of_output.zip(unit(input)).map_or(f64::NAN, |(output, input)| output / input));
         }
+        inspection.doubt_steps();
         inspection.share_delays();
         Ok(())
     }

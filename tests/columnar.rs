@@ -62,7 +62,14 @@ fn every_verb_reads_them() {
                 words.insert(if words[0] == "track" { 1 } else { 2 }, log);
                 folder.done(&format!("{} --time when", words.join(" "))).stdout
             };
-            assert_eq!(of(name), of("log.csv"), "{verb} {name}");
+            // A zone that has a name is written in UTC: predictions have the same rows, and then the same values.
+            let values = |csv: String| match verb.starts_with("track") {
+                true => csv,
+                false => {
+                    csv.lines().filter_map(|line| Some(format!("{}\n", line.split_once(',')?.1))).collect()
+                }
+            };
+            assert_eq!(values(of(name)), values(of("log.csv")), "{verb} {name}");
         }
         folder.done(&format!("validate model.json {name} --time when"));
         let json = folder.done(&format!("inspect {name} --time when --format json")).stdout;

@@ -193,12 +193,14 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");
-    for subfolder in ["tests/data/public", "tests/data/columnar"] {
+    for subfolder in ["tests/data/public", "tests/data/columnar", "tests/data/spreadsheets"] {
         fs::create_dir_all(folder.path(subfolder)).expect("the folder can be written to");
     }
     let public = files("tests/data/public", ".csv");
     let columnar = files("tests/data/columnar", ".parquet");
-    for file in [files("tests/data", ".toml"), files("tests/data", ".csv"), public, columnar].concat() {
+    let sheets = files("tests/data/spreadsheets", ".xlsx");
+    for file in [files("tests/data", ".toml"), files("tests/data", ".csv"), public, columnar, sheets].concat()
+    {
         folder.write(&file, fs::read(root().join(&file)).expect("data"));
     }
     let (mut compared, mut code) = (0, 0);

@@ -114,9 +114,10 @@ def test_what_is_assumed_is_said() -> None:
             assert repr(log_of(frame(index))) == f"{rows} assumed, as the index holds numbers)"
         assert told[0].filename == __file__
     for data in (frame(at=PLAIN), frame(at=PLAIN.astype(str)), pl.from_pandas(frame(at=PLAIN))):
-        with pytest.warns(UserWarning, match="column 'at' looks like a clock; time='at' would use it; 1 s is assumed") as told:
-            log_of(data)
-        assert told[0].filename == __file__
+        assert repr(log_of(data)) == repr(log_of(data, time="at"))
+        assert log_of(data, sample_time=1).sample_time == 1
+    with pytest.raises(ValueError, match="several columns may be the clock: 'at', 'made'; name one with time, or give sample_time"):
+        log_of(frame(at=PLAIN, made=PLAIN))
 
 
 def test_the_sample_time_is_a_duration() -> None:
@@ -358,8 +359,7 @@ def test_numbers_since_1970_are_told_by_their_size(unit: str, second: int) -> No
         assert floats.sample_time == pytest.approx(log.sample_time, rel=1e-4)
     if unit in ("ms", "us"):
         assert th.Log(np.arange(200.0), time=counted + 0.25).sample_time == pytest.approx(0.01)
-    with pytest.warns(UserWarning, match="column 'when' looks like a clock; time='when' would use it; 1 s is assumed"):
-        th.Log.from_dataframe(frame, inputs="u", output="y")
+    assert th.Log.from_dataframe(frame, inputs="u", output="y") == log
 
 
 def test_numbers_that_may_be_since_1970_warn() -> None:

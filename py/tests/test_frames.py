@@ -364,3 +364,43 @@ def test_levels_that_do_not_tell_runs_apart_are_refused() -> None:
     codes = frame.index.set_codes([-1, *frame.index.codes[0][1:]], level="run", verify_integrity=False)
     with pytest.raises(ValueError, match="the level 'run' of its index is missing in row 1; it tells which run"):
         th.Log.from_dataframe(frame.set_axis(codes), inputs="u", output="y")
+
+
+def test_labels_may_be_numbers_and_tuples() -> None:
+    values = np.random.default_rng(1).random((30, 2))
+    numbered = pd.DataFrame(values)
+    for inputs, output in ((0, 1), ([0], [1]), (["0"], "1")):
+        log = th.Log.from_dataframe(numbered, inputs=inputs, output=output, sample_time=1)
+        assert (log.inputs, log.output) == (["0"], "1")
+        assert np.array_equal(log.y, values[:, 1])
+    tuples = pd.DataFrame(values, columns=pd.MultiIndex.from_tuples([("pump", "u"), ("tank", "y")]))
+    log = th.Log.from_dataframe(tuples, inputs=[("pump", "u")], output=[("tank", "y")], sample_time=1)  # type: ignore[list-item]
+    assert (log.inputs, log.output) == (["pump.u"], "tank.y")
+    for wrong in (None, True, 1.5):
+        with pytest.raises(TypeError, match="output: expected a name or several"):
+            th.Log.from_dataframe(numbered, output=wrong, sample_time=1)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="there is no column '7'"):
+        th.Log.from_dataframe(numbered, output=7, sample_time=1)
+
+
+def test_lazy_frames_are_collected() -> None:
+    pl = pytest.importorskip("polars")
+    frame = pl.DataFrame({"u": [1.0, 0.0, 1.0], "y": [0.0, 1.0, 0.5]})
+    assert th.Log.from_dataframe(frame.lazy(), inputs="u", output="y", sample_time=1) == th.Log.from_dataframe(
+        frame, inputs="u", output="y", sample_time=1
+    )
+
+
+def test_arrays_of_xarray() -> None:
+    pytest.importorskip("xarray")
+    index = pd.date_range("2026-01-01", periods=50, freq="min", name="time")
+    frame = pd.DataFrame({"u": np.arange(50.0), "y": np.arange(50.0) ** 2}, index)
+    data = frame.to_xarray()
+    expected = th.Log.from_dataframe(frame, inputs="u", output="y")
+    assert th.Log.from_dataframe(data, inputs="u", output="y") == expected
+    assert th.Log(data["y"], data["u"]) == expected
+    assert th.Log(data["y"]).sample_time == 60
+    plain = data["y"].drop_vars("time")
+    assert np.array_equal(th.Log(plain, sample_time=60).y, expected.y)
+    several = data[["u", "y"]].to_array().T
+    assert th.Log(data["y"].values, several, sample_time=60).inputs == ["u1", "u2"]

@@ -9,12 +9,28 @@ from typing import TYPE_CHECKING, Any
 
 import narwhals.stable.v2 as nw
 import numpy as np
+from narwhals.dependencies import is_pandas_like_dataframe
 from numpy.typing import NDArray
 
 from thetahat import _clock, _numbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+
+def name_of(label: Any) -> str:
+    """What a column of this label is called: labels may be numbers, or tuples of a MultiIndex."""
+    return label if isinstance(label, str) else ".".join(map(str, label)) if isinstance(label, tuple) else str(label)
+
+
+def plain(frame: Any) -> Any:
+    """A frame whose columns are called by texts: a lazy frame collected, a Dataset of xarray as a frame of pandas."""
+    frame = _numbers.of_xarray(frame)
+    if not isinstance(frame, nw.DataFrame) and hasattr(frame, "collect") and hasattr(frame, "collect_schema") and hasattr(frame, "lazy"):
+        frame = frame.collect()
+    if is_pandas_like_dataframe(frame) and not all(isinstance(label, str) for label in frame.columns):
+        frame = frame.set_axis([name_of(label) for label in frame.columns], axis=1)
+    return frame
 
 
 def columns(frame: Any, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:

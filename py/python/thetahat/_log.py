@@ -80,6 +80,7 @@ class Log:
         output_name: str | Sequence[str] | None = None,
         uniform: bool = True,
     ) -> None:
+        y, u = _numbers.of_xarray(y), _numbers.of_xarray(u)
         channels = _inputs(u, input_names)
         names = [name for name, _ in channels]
         outputs = _outputs(y, output_name)
@@ -107,8 +108,8 @@ class Log:
         cls,
         frame: Any,
         *,
-        inputs: Sequence[str] | str = (),
-        output: str | Sequence[str],
+        inputs: Sequence[str | int] | str | int = (),
+        output: str | int | Sequence[str | int],
         time: str | npt.ArrayLike | None = None,
         sample_time: Duration | None = None,
         resample: Resample | None = None,
@@ -119,15 +120,17 @@ class Log:
         Parameters
         ----------
         frame : data frame
-            Of pandas, Polars, PyArrow, or any library with their interchange protocols. Missing values become NaN. Where an index of
-            pandas has several levels, such as run and time, one is the clock, and each run of the others is an experiment.
+            Of pandas, Polars, PyArrow, or any library with their interchange protocols; a lazy frame is collected, a Dataset of xarray made
+            one of pandas. Missing values become NaN. Where an index of pandas has several levels, such as run and time, one is the clock,
+            and each run of the others is an experiment.
         inputs : sequence of str, or str
-            The columns that are inputs; none for a time series.
+            The columns that are inputs; none for a time series. Labels that are numbers, or in a list tuples, name a column too; the
+            channel is then called by their text.
         output : str or sequence of str
             The column that is the output, or those that are.
         time : str or array_like, optional
             The column that holds the times, or the index of this name, or the times themselves, see `Log`. Without it an index
-            of pandas is the clock if it holds times; one that counts rows is not.
+            of pandas is the clock if it holds times; one that counts rows is not. Else it is the one other column that holds times.
         sample_time, resample, uniform
             As for `Log`.
 
@@ -156,8 +159,8 @@ class Log:
         """
         from thetahat import _frames
 
-        names = [_options.text("inputs", name) for name in ([inputs] if isinstance(inputs, str) else inputs)]
-        outputs = names_of("output", output)
+        frame = _frames.plain(frame)
+        names, outputs = _called("inputs", inputs), _called("output", output)
         runs = _frames.runs(frame, time if isinstance(time, str) else None)
         if runs:
             if time is not None and not isinstance(time, str):
@@ -177,11 +180,16 @@ class Log:
             clock, argument = _frames.clock(frame, time), f"time={time!r}"
         elif time is not None:
             clock = Clock("by time", _clock.read("time", time), _labels(index))
+        elif sample_time is None and not _is_clock(index):
+            found = _frames.clocks(frame, [*names, *outputs])
+            if len(found) > 1:
+                raise ValueError(
+                    f"several columns may be the clock: {', '.join(map(repr, found))}; name one with time, or give sample_time"
+                )
+            if found:
+                clock, argument = _frames.clock(frame, found[0]), f"time={found[0]!r}"
         roles = (names, outputs)
         log, clock = _made(channels, roles, clock, index, sample_time, resample, argument, uniform=uniform)
-        if clock.said.startswith("assumed"):
-            for name in _frames.clocks(frame, [*names, *outputs])[:1]:
-                _said.warn(f"column {name!r} looks like a clock; time={name!r} would use it; 1 s is assumed", stacklevel=2)
         return cls._of(log, clock)
 
     @classmethod
@@ -521,6 +529,22 @@ def _outputs(y: npt.ArrayLike | _numbers.Columns, names: str | Sequence[str] | N
 
 def _labels(index: Any) -> _clock.Labels | None:
     return None if index is None else _clock.labels_of(index)
+
+
+def _is_clock(index: Any) -> bool:
+    """Whether an index is one; what is to be said of it is said by who takes it."""
+    with _said.kept():
+        return index is not None and _clock.of_index(index) is not None
+
+
+def _called(argument: str, labels: Any) -> list[str]:
+    """The names of columns by their labels, which may be numbers, or in a list tuples."""
+    from thetahat import _frames
+
+    if isinstance(labels, (bool, float)) or labels is None:
+        raise TypeError(f"{argument}: expected a name or several, found {labels!r}")
+    several = [labels] if isinstance(labels, (str, int, np.integer)) else labels
+    return names_of(argument, [label if isinstance(label, str) else _frames.name_of(label) for label in several])
 
 
 def names_of(argument: str, names: Sequence[str] | str) -> list[str]:

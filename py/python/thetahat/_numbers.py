@@ -125,6 +125,7 @@ def of_library(argument: str, value: Any) -> Any:
 
     The names of a frame's columns are each there once.
     """
+    value = of_xarray(value)
     if isinstance(value, (list, tuple, np.ndarray)):
         return value
     try:
@@ -140,6 +141,19 @@ def of_library(argument: str, value: Any) -> Any:
         message = f"{argument}: two columns have the name {twice(names)!r}; rename one"
         raise ValueError(message)
     return native
+
+
+def of_xarray(value: Any) -> Any:
+    """What xarray labels, as pandas has it: a Dataset as a frame, an array of one dimension with a coordinate as a series. Arrays without
+    a coordinate, or with several dimensions, are those of NumPy. Anything else as it is.
+    """
+    if type(value).__module__.partition(".")[0] != "xarray":
+        return value
+    if hasattr(value, "data_vars"):
+        return value.to_dataframe()
+    if getattr(value, "ndim", 0) == 1 and value.dims[0] in value.coords:
+        return value.to_series()
+    return np.asarray(value)
 
 
 def _of_capsule(value: Any) -> Any:

@@ -188,7 +188,8 @@ def _read(
     said = "assumed" if time is None and options.get("sample_time") is None else "" if time is None else f"by column {time!r}"
     said = said if options.get("resample") is None else f"{said}, resampled"
     # Several logs have no common start.
-    times = None if start is None or log.boundaries else labels_from(start, log.time(), time)
+    seconds = None if log.boundaries else log.time()
+    times = None if start is None or seconds is None else labels_from(start, seconds, time)
     return Log._of(log, Clock(said, times, column=True))
 
 

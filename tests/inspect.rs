@@ -347,3 +347,68 @@ fn rows_that_repeat_at_the_end_are_told_by_inspect_and_fit() {
     folder.write("log.csv", log(&padded(&u), &[&y[..], &Random::new(3).signal(40)].concat()));
     assert!(!says(&inspected(&folder, "log.csv --sample-time 1"), "no channel changes"));
 }
+
+#[test]
+fn a_sensor_that_is_stuck_is_named_with_its_rows() {
+    let Experiment { u, mut y } = Experiment::new(400);
+    let held = y[250];
+    y[250..330].fill(held);
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let document = inspected(&folder, "log.csv");
+    assert_eq!(document["channels"][1]["stuck"], json!([251, 330]));
+    assert!(says(&document, "channel 'y' stands still in rows 251..330, as nowhere else"));
+    // Nothing is stuck that goes from level to level, is switched on once, or rests at the beginning.
+    let steps: Vec<f64> = (0..400).map(|row| f64::from(row / 50 % 3)).collect();
+    let switch: Vec<f64> = (0..400).map(|row| f64::from(u8::from(row > 40))).collect();
+    let mut rest = u.clone();
+    rest[..100].fill(0.0);
+    folder.write("log.csv", csv(&[("u", &u), ("rest", &rest), ("steps", &steps), ("switch", &switch)]));
+    let document = inspected(&folder, "log.csv");
+    assert!(!says(&document, "stands still"), "{}", document["warnings"]);
+}
+
+#[test]
+fn outliers_that_another_channel_explains_are_none() {
+    // A hammer blow every 100 rows, and what rings after it.
+    let blow = |row: usize| if row % 100 == 20 { 50.0 } else { 0.0 };
+    let mut random = crate::signals::Random::new(3);
+    let ring = |row: usize| {
+        let since = (row + 80) % 100;
+        9.0 * (-0.4 * since as f64).exp() * (1.5 * since as f64).cos() * f64::from(u8::from(row >= 20))
+    };
+    let y: Vec<f64> = (0..600).map(|row| ring(row) + 0.01 * random.uniform()).collect();
+    let u: Vec<f64> = (0..600).map(|row| blow(row) + 0.01 * random.uniform()).collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let document = inspected(&folder, "log.csv");
+    assert!(!says(&document, "far from their neighbours"), "{}", document["warnings"]);
+    // A glitch of the sensor is one.
+    let mut y = y;
+    y[370] = 80.0;
+    folder.write("log.csv", csv(&[("u", &u), ("y", &y)]));
+    assert!(says(
+        &inspected(&folder, "log.csv"),
+        "channel 'y' has values far from their neighbours at row 371"
+    ));
+}
+
+#[test]
+fn one_step_is_no_sample_of_feedback_and_delays() {
+    // A heater that is switched on once, with a slow sensor and drifting surroundings.
+    let mut random = crate::signals::Random::new(8);
+    let (mut x, mut drift) = (0.0, 0.0);
+    let u: Vec<f64> = (0..500).map(|row| if row < 60 { 0.0 } else { 40.0 }).collect();
+    let y: Vec<f64> = (0..500)
+        .map(|row| {
+            drift = 0.995 * drift + 0.02 * random.uniform();
+            x += (if row >= 74 { 0.5 * u[row] } else { 0.0 } - x) / 80.0;
+            20.0 + x + drift + 0.02 * random.uniform()
+        })
+        .collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let document = inspected(&folder, "log.csv");
+    assert!(!says(&document, "feedback is suspected"), "{}", document["warnings"]);
+    assert_eq!(document["feedback"][0]["p_value"], Value::Null);
+    let certain = document["delays"][0]["confidence"].as_f64().is_none_or(|confidence| confidence >= 0.5);
+    assert!(certain, "{}", document["delays"][0]);
+    assert!(says(&document, "whether the input follows the output cannot be told"));
+}

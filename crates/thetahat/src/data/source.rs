@@ -3,7 +3,6 @@
 use jiff::SignedDuration;
 use jiff::civil::DateTime;
 use jiff::fmt::temporal::Pieces;
-use jiff::tz::Offset;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -57,9 +56,10 @@ impl Source {
     }
 
     /// Seconds from the beginning of 1970 to the first time, as the clocks on the wall of its zone show it. None where times are no dates.
+    #[cfg(feature = "html")]
     pub(crate) fn wall_seconds(&self) -> Option<f64> {
         let wall = Start::of(self.start.as_deref()?)?.wall;
-        Some(Offset::UTC.to_timestamp(wall).ok()?.as_nanosecond() as f64 / 1e9)
+        Some(jiff::tz::Offset::UTC.to_timestamp(wall).ok()?.as_nanosecond() as f64 / 1e9)
     }
 }
 

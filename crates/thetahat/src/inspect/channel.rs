@@ -1,7 +1,50 @@
 //! The quality of one channel.
 
+use statrs::distribution::{Binomial, DiscreteCDF};
+
 use super::{ChannelQuality, moments, outliers, quantization, saturation};
 use crate::data::{Channel, Rows, Times};
+
+/// An outlier so many rows from a jump of another channel is an answer to it, or what it answers.
+const ANSWERS: usize = 10;
+/// And that so many lie so near has at most this probability where there is nothing in it.
+const CHANCE: f64 = 0.01;
+/// A jump is this part of the largest change, and so many times what nine of ten changes are.
+const LARGE: f64 = 0.5;
+const RARE: f64 = 10.0;
+
+/// The rows (0-based) at which a channel jumps: a hammer blow, the kick after a step of the set point.
+pub(super) fn jumps(values: &[f64]) -> Vec<usize> {
+    let changes: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+    let mut sorted: Vec<f64> = changes.iter().copied().filter(|change| !change.is_nan()).collect();
+    if sorted.is_empty() {
+        return Vec::new();
+    }
+    let place = sorted.len() * 9 / 10;
+    let (_, usual, above) = sorted.select_nth_unstable_by(place, f64::total_cmp);
+    let largest = above.iter().copied().fold(*usual, f64::max);
+    let limit = (LARGE * largest).max(RARE * *usual);
+    let is_jump = |change: f64| change >= limit && change > 0.0;
+    (1..values.len()).filter(|row| is_jump(changes[row - 1])).collect()
+}
+
+/// Takes the outliers out of a channel that other channels explain, by the rows (0-based, sorted) at which these jump: where more of them
+/// lie near jumps than chance brings there once in a hundred times.
+pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usize], rows: usize) {
+    let near = |row: usize| {
+        let next = jumps.partition_point(|jump| jump + ANSWERS < row);
+        jumps.get(next).is_some_and(|jump| *jump <= row + ANSWERS)
+    };
+    let covered = (0..rows).filter(|row| near(*row)).count() as f64 / rows as f64;
+    let explained = all.iter().filter(|row| near(**row - 1)).count() as u64;
+    let by_chance = Binomial::new(covered, all.len() as u64);
+    if explained == 0 || by_chance.map_or(1.0, |chance| chance.sf(explained - 1)) > CHANCE {
+        return;
+    }
+    let left: Vec<usize> = all.iter().copied().filter(|row| !near(row - 1)).collect();
+    quality.outlier_count = left.len();
+    quality.outliers = left.into_iter().take(NAMED).collect();
+}
 
 /// The first rows of outliers that are named.
 pub(super) const NAMED: usize = 20;
@@ -11,27 +54,31 @@ const STUCK: usize = 20;
 /// And so many times the longest other one.
 const ALONE: usize = 4;
 
-/// The rows of the longest run of equal values, where no other one comes near it: a channel that moves in steps has more of them.
+/// The rows of the longest run of equal values inside of a log, where no other one comes near it and the channel moves otherwise: one that
+/// goes from level to level, or is at rest to its rounding, has more of them.
 fn stuck(values: &[f64]) -> Option<Rows> {
-    let (mut row, mut longest, mut second) = (0, 0..0, 0);
+    let (mut row, mut longest, mut second, mut repeated) = (0, 0..0, 0, 0);
     for run in values.chunk_by(|left, right| left == right) {
         let own = row..row + run.len();
         row = own.end;
         if run[0].is_nan() {
             continue;
         }
+        repeated += run.len() - 1;
         if own.len() > longest.len() {
             (longest, second) = (own, longest.len());
         } else {
             second = second.max(own.len());
         }
     }
-    let alone = longest.len() >= STUCK.max(ALONE * second) && longest.len() < values.len();
-    alone.then(|| Rows::from_positions(&longest))
+    let inside = longest.start > 0 && longest.end < values.len();
+    let alone = longest.len() >= STUCK.max(ALONE * second);
+    let moves = 2 * (repeated + 1).saturating_sub(longest.len()) <= values.len() - longest.len();
+    (inside && alone && moves).then(|| Rows::from_positions(&longest))
 }
 
-/// Looks at the values of a channel as they are. O(N log N); up to 32 bytes for each value besides the values themselves.
-pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> ChannelQuality {
+/// Looks at the values of a channel as they are; also all rows (1-based) of its outliers. O(N log N); up to 32 bytes for each value besides the values themselves.
+pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> (ChannelQuality, Vec<usize>) {
     let all = &channel.values;
     // Where nothing is missing, the values serve as they are.
     let rows: Option<Vec<usize>> = all
@@ -49,7 +96,9 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> C
     };
     let mut sorted: Vec<f64> = all.iter().copied().filter(|value| !value.is_nan()).collect();
     sorted.sort_unstable_by(f64::total_cmp);
-    let (Some(&minimum), Some(&maximum)) = (sorted.first(), sorted.last()) else { return quality };
+    let (Some(&minimum), Some(&maximum)) = (sorted.first(), sorted.last()) else {
+        return (quality, Vec::new());
+    };
     quality.minimum = Some(minimum);
     quality.maximum = Some(maximum);
     quality.saturation = saturation::saturation(all, &sorted);
@@ -73,8 +122,9 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> C
         quality.trend = Some(slope / scale).filter(|slope| slope.is_finite());
         quality.trend_share = quality.trend.map(|_| share);
     }
-    let far = outliers::outliers(&scaled);
+    let far: Vec<usize> =
+        outliers::outliers(&scaled).into_iter().map(|position| row_of(position) + 1).collect();
     quality.outlier_count = far.len();
-    quality.outliers = far.iter().take(NAMED).map(|&position| row_of(position) + 1).collect();
-    quality
+    quality.outliers = far.iter().take(NAMED).copied().collect();
+    (quality, far)
 }

@@ -93,7 +93,7 @@ pub struct ChannelQuality {
     pub repeated: usize,
     /// The longest run of equal values, in rows.
     pub longest_hold: usize,
-    /// Its rows, where it is no habit of the channel to stand still, and another channel moves meanwhile: a sensor that is stuck.
+    /// Its rows, where it is no habit of the channel to stand still: a sensor that is stuck.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stuck: Option<Rows>,
     /// The step of which all values are multiples, away from an offset, to rounding; none if there is none.

@@ -122,19 +122,21 @@ fn of_the_rows(
     plan: &InspectionPlan,
 ) -> Result<Inspection, Error> {
     let rows = check(channels)?;
-    let mut quality: Vec<ChannelQuality> = channels
+    let (mut quality, far): (Vec<ChannelQuality>, Vec<Vec<usize>>) = channels
         .par_iter()
         .map(|channel| channel::quality(channel, roles.get(channel.name.as_str()).copied(), times))
-        .collect();
-    // Where everything stands still, nothing is stuck.
-    let moves = |rows: &Rows, but: usize| {
-        let others = channels.iter().enumerate().filter(|(place, _)| *place != but);
-        let moves =
-            |values: &[f64]| values[rows.positions()].windows(2).filter(|pair| pair[0] != pair[1]).count();
-        others.map(|(_, channel)| 2 * moves(&channel.values)).max().is_some_and(|twice| twice > rows.len())
-    };
-    for (place, channel) in quality.iter_mut().enumerate() {
-        channel.stuck = channel.stuck.filter(|rows| moves(rows, place));
+        .unzip();
+    if far.iter().any(|rows| !rows.is_empty()) {
+        let jumps: Vec<Vec<usize>> =
+            channels.par_iter().map(|channel| channel::jumps(&channel.values)).collect();
+        for (place, (own, far)) in
+            quality.iter_mut().zip(&far).enumerate().filter(|(_, (_, far))| !far.is_empty())
+        {
+            let others = jumps.iter().enumerate().filter(|(other, _)| *other != place);
+            let mut others: Vec<usize> = others.flat_map(|(_, rows)| rows.iter().copied()).collect();
+            others.sort_unstable();
+            channel::explain(own, far, &others, rows);
+        }
     }
     described(quality, rows, ticks, source, plan)
 }

@@ -67,7 +67,7 @@ fn deviations(signal: &[f64]) -> Vec<f64> {
 }
 
 fn quality(values: Vec<f64>) -> ChannelQuality {
-    channel::quality(&Channel { name: "x".into(), values }, None, &Times::Uniform(1.0))
+    channel::quality(&Channel { name: "x".into(), values }, None, &Times::Uniform(1.0)).0
 }
 
 fn recording(channels: &[(&str, &[f64])], times: Times) -> Recording {

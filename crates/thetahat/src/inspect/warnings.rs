@@ -99,7 +99,7 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<String> {
     }
     if let Some(stuck) = channel.stuck {
         say(format!(
-            "stands still in rows {}..{} while others move: where the sensor was stuck, empty these fields",
+            "stands still in rows {}..{}, as nowhere else: where the sensor was stuck, empty these fields",
             stuck.first(),
             stuck.last()
         ));

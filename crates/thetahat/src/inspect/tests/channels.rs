@@ -50,12 +50,12 @@ fn offsets_and_sizes_lose_nothing() {
 fn a_line_is_all_trend() {
     let times = Times::Uniform(0.5);
     let line = Channel { name: "x".into(), values: (0..50).map(|row| 7.0 - 0.25 * f64::from(row)).collect() };
-    let found = channel::quality(&line, Some("input"), &times);
+    let (found, _) = channel::quality(&line, Some("input"), &times);
     assert!((found.trend.unwrap() + 0.5).abs() < 1e-14);
     assert!((found.trend_share.unwrap() - 1.0).abs() < 1e-14);
     assert_eq!(found.role.as_deref(), Some("input"));
     let times = Times::Measured((0..50).map(|row| 1e9 + 2.0 * f64::from(row)).collect());
-    assert!((channel::quality(&line, None, &times).trend.unwrap() + 0.125).abs() < 1e-14);
+    assert!((channel::quality(&line, None, &times).0.trend.unwrap() + 0.125).abs() < 1e-14);
 }
 
 #[test]

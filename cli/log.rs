@@ -108,39 +108,33 @@ pub(crate) fn load(
     let Columns { channels, table, mut source, clock, restarts, mut words } =
         columns(path, job, false, |reader| choose(reader.names()))?;
     let file = source.file.clone();
-    // The times up to where the clock begins again.
-    let first = || {
-        let time = table.time.as_deref()?;
-        Some(restarts.first().map_or(time, |end| &time[..*end]))
-    };
-    let mut how = clock.resample();
-    if let (None, false, Some(time)) = (how, clocks.any, first()) {
-        how = Resample::for_two_rates(time).map_err(at_line(&file, &table.lines))?;
-        words.extend(how.map(|how| {
-            format!(
-                "{file}: the log has two rates, and what it is used for needs one: it is resampled every {} s, channels that move in \
-                 steps by hold, the others by straight lines; --resample says otherwise",
-                how.step
-            )
-        }));
+    let rows = table.rows;
+    if let (Some(how), Some(time)) = (clock.resample(), &table.time) {
+        // Up to where the clock begins again.
+        let first = restarts.first().map_or(time.as_slice(), |end| &time[..*end]);
+        source.resampled = Some(Resampling::new(&how, first).map_err(at_line(&file, &table.lines))?);
     }
-    let one = |channels: Vec<Channel>, time: Option<Vec<f64>>| match (how, time) {
-        (Some(how), Some(time)) => Log::resampled(channels, &time, &how),
-        (_, time) => made(channels, time, &clock, clocks),
+    let one = |channels: Vec<Channel>, time: Option<Vec<f64>>| match (clock.resample(), time) {
+        (Some(how), Some(time)) => Ok((Log::resampled(channels, &time, &how)?, None)),
+        (None, Some(time)) if !clocks.any => Log::recorded(channels, time)?.on_one_rate(),
+        (_, time) => Ok((made(channels, time, &clock, clocks)?, None)),
     };
-    if let (Some(how), Some(time)) = (how, first()) {
-        source.resampled = Some(Resampling::new(&how, time).map_err(at_line(&file, &table.lines))?);
+    let each = match (restarts.as_slice(), table.time) {
+        ([_, ..], Some(time)) => {
+            cut(channels, &time, &restarts).map(|(channels, time)| one(channels, Some(time))).collect()
+        }
+        (_, time) => one(channels, time).map(|own| vec![own]),
+    };
+    let each: Vec<(Log, Option<Resample>)> = each.map_err(at_line(&file, &table.lines))?;
+    if let Some(Resample { step, interpolation, .. }) = each.iter().find_map(|(_, how)| *how) {
+        words.push(format!(
+            "{file}: the log has two rates, and what it is used for needs one: it is resampled every {step} s, channels that move in steps \
+             by hold, the others by straight lines; --resample says otherwise"
+        ));
+        source.resampled = Some(Resampling { step, interpolation, rows, anti_alias: None });
     }
-    let log = match (restarts.as_slice(), table.time) {
-        ([_, ..], Some(time)) => Log::join(
-            cut(channels, &time, &restarts)
-                .map(|(channels, time)| one(channels, Some(time)))
-                .collect::<Result<_, _>>()
-                .map_err(at_line(&file, &table.lines))?,
-        ),
-        (_, time) => one(channels, time),
-    };
-    let log = log.map_err(at_line(&file, &table.lines))?;
+    let logs = each.into_iter().map(|(log, _)| log).collect();
+    let log = Log::join(logs).map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
     Ok(Loaded { log, source, words })
 }

@@ -214,13 +214,23 @@ pub(super) fn of_numbers(name: &str, unit: Option<&str>, numbers: &[f64], given:
         }
     }
     let Some(step) = step else { return plain(Written::Numbers(Unit::Seconds)) };
-    // Steps of a spreadsheet's days are whole seconds, or fractions of them.
+    // Steps of a spreadsheet's days are whole seconds, or tenths of them, and hardly ever a short number of days: a clock of seconds
+    // that has run for half a day has such steps.
+    let tenths = step * 864_000.0;
+    let is_short = (super::error::rounded(step) / step - 1.0).abs() < 1e-6;
+    let dated = name.to_lowercase().starts_with("dat");
     if is_sheet(low, high)
+        && 5e-7 < step
         && step < 1.0
-        && (step * 864_000.0 - (step * 864_000.0).round()).abs() < 0.02
-        && step > 5e-7
+        && (tenths - tenths.round()).abs() < 0.02
+        && (dated || !is_short)
     {
-        return plain(Written::Since(Unit::Days, -SHEET_DAYS));
+        return Recognised {
+            written: Written::Since(Unit::Days, -SHEET_DAYS),
+            told: (!dated).then(|| {
+                "its numbers are read as a spreadsheet's days; `time-unit` s reads seconds".to_owned()
+            }),
+        };
     }
     let other = match step {
         step if step > 1e6 => Some(Unit::Nanoseconds),
@@ -242,4 +252,68 @@ pub(super) fn of_numbers(name: &str, unit: Option<&str>, numbers: &[f64], given:
 
 fn is_sheet(low: f64, high: f64) -> bool {
     SHEETS[0] <= low && high <= SHEETS[1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(name: &str, first: f64, step: f64) -> Recognised {
+        let numbers: Vec<f64> = (0..50).map(|row| first + f64::from(row) * step).collect();
+        of_numbers(name, None, &numbers, None)
+    }
+
+    #[test]
+    fn numbers_are_read_in_the_unit_that_they_can_only_have() {
+        let days = Written::Since(Unit::Days, -SHEET_DAYS);
+        for (name, first, step, expected, is_told) in [
+            ("t", 0.0, 0.01, Written::Numbers(Unit::Seconds), false),
+            ("t", 40_000.0, 0.01, Written::Numbers(Unit::Seconds), false),
+            ("t", 40_000.0, 1.0, Written::Numbers(Unit::Seconds), false),
+            ("t", 45_301.0, 10.0 / 86_400.0, days.clone(), true),
+            ("Date", 45_301.0, 10.0 / 86_400.0, days.clone(), false),
+            ("Date", 45_301.0, 0.25, days, false),
+            ("t", 1.7e9, 0.5, Written::Since(Unit::Seconds, 0), false),
+            ("t", 1.7e12, 20.0, Written::Since(Unit::Milliseconds, 0), false),
+            ("t", 1.7e15, 20_000.0, Written::Since(Unit::Microseconds, 0), false),
+            ("t", 1.7e18, 2e7, Written::Since(Unit::Nanoseconds, 0), false),
+            // Microseconds since a processor was switched on.
+            ("t", 1.2e9, 10_000.0, Written::Numbers(Unit::Seconds), true),
+            ("t_us", 1.2e9, 10_000.0, Written::Numbers(Unit::Microseconds), false),
+            ("t [h]", 0.0, 1e-5, Written::Numbers(Unit::Hours), false),
+            ("t", 0.0, 1e-5, Written::Numbers(Unit::Seconds), true),
+        ] {
+            let found = written(name, first, step);
+            assert_eq!((found.written, found.told.is_some()), (expected, is_told), "{name} {first} {step}");
+        }
+    }
+
+    #[test]
+    fn dates_are_read_in_the_format_that_all_have() {
+        let found = |dates: &[&str]| {
+            let dates: Vec<String> = dates.iter().map(|date| (*date).to_owned()).collect();
+            super::dates(&dates)
+        };
+        for (dates, format) in [
+            (["27.10.2024 00:30:00", "27.10.2024 00:30:10.5"], "%d.%m.%Y %H:%M:%S%.f"),
+            (["27.10.24 00:30", "27.10.24 00:31"], "%d.%m.%y %H:%M"),
+            (["01/13/2024 10:00", "01/13/2024 10:01"], "%m/%d/%Y %H:%M"),
+            (["13/01/2024 10:00", "13/01/2024 10:01"], "%d/%m/%Y %H:%M"),
+            (["2024/01/13", "2024/01/14"], "%Y/%m/%d"),
+            (["10:00:00", "10:00:01"], "%H:%M:%S%.f"),
+        ] {
+            let written = found(&dates).unwrap().unwrap().written;
+            assert_eq!(written, Written::Dates(Some(format.to_owned())), "{dates:?}");
+        }
+        assert_eq!(
+            found(&["2024-01-10", "2024-01-11T10:00Z"]).unwrap().unwrap().written,
+            Written::Dates(None)
+        );
+        assert_eq!(found(&["23:59:59", "24:00:00"]).unwrap().unwrap().written, Written::Durations);
+        assert_eq!(found(&["1-2-3", "x"]), Ok(None));
+        // Of several days nobody knows; in one it does not matter.
+        let error = found(&["03/04/2024 10:00", "04/04/2024 10:00"]).unwrap_err();
+        assert!(error.contains("`time-format` '%d/%m/%Y %H:%M' or '%m/%d/%Y %H:%M'"), "{error}");
+        assert!(found(&["03/04/2024 10:00", "03/04/2024 10:01"]).unwrap().unwrap().told.is_some());
+    }
 }

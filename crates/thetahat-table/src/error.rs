@@ -123,9 +123,14 @@ impl fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
+/// The nearest number with four digits.
+pub(super) fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
 /// A number with a few digits, as a message has it.
 pub(super) fn figure(value: f64) -> String {
-    let short: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    let short = rounded(value);
     if (1e-4..1e7).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
 }
 

@@ -16,11 +16,11 @@ use super::{Header, Options};
 /// The delimiters that are recognised, in the order of preference between two that fit equally well: a comma
 /// may be a decimal comma or part of a text, a tab hardly ever is.
 const DELIMITERS: [u8; 3] = [b'\t', b';', b','];
-/// How many lines say what separates fields.
-const LINES: usize = 256;
-/// How many lines, and how many fields in them, say what the columns hold.
+/// How many lines, and how many fields in them, say what separates fields and what the columns hold.
 const MOST_LINES: usize = 1000;
 const MOST_FIELDS: usize = 20_000;
+/// Where most of so many lines are values, there is nothing to doubt.
+const FEW_LINES: usize = 32;
 /// How many different words of a column are told.
 const MOST_WORDS: usize = 5;
 
@@ -153,9 +153,7 @@ impl<'t> Lines<'t> {
                 .map(|field| Sort::of(dialect.trimmed(record.field(field)), numbers))
                 .collect();
             fields += sorts.len();
-            let sign = rest.trim_ascii_start().first().copied();
-            let is_mark = |sign: &u8| MARKS.contains(sign) || rest.trim_ascii_start().starts_with(b"//");
-            let mark = sign.filter(|sign| dialect.comment.is_none() && is_mark(sign));
+            let mark = mark(rest, dialect);
             lines.push(Line { start: position, number, sorts, mark });
             number += memchr::memchr_iter(b'\n', &rest[..length]).count() as u64;
             position += length;
@@ -172,13 +170,8 @@ impl<'t> Lines<'t> {
 
     /// The most frequent number of fields, unless that is one, and how many lines have it.
     fn width(&self) -> (usize, usize) {
-        let counts: Vec<usize> =
-            self.lines.iter().filter(|line| !line.is_marked()).map(|line| line.sorts.len()).collect();
-        let agreeing = |count: usize| counts.iter().filter(|&&other| other == count).count();
-        match counts.iter().map(|&count| (agreeing(count), count)).max() {
-            Some((lines, count)) if count > 1 => (lines, count),
-            _ => (0, 1),
-        }
+        let own = self.lines.iter().filter(|line| !line.is_marked());
+        most_frequent(&own.map(|line| line.sorts.len()).collect::<Vec<_>>())
     }
 
     /// How many lines have nothing in their fields that is a word.
@@ -429,28 +422,73 @@ fn separator(text: &[u8]) -> ((usize, u64), Option<u8>) {
 /// alone make values of what is between them.
 fn most_consistent(text: &[u8], first: (usize, u64), options: &Options, numbers: &Numbers) -> Dialect {
     let dialect = |delimiter, blanks| Dialect { delimiter, comment: options.comment, blanks };
-    let read = |dialect| Lines::read(text, first, dialect, numbers, LINES);
     let (mut best, mut most) = (dialect(b';', false), 0);
     for delimiter in DELIMITERS {
         if delimiter == b',' && options.decimal_comma == Some(true) || Some(delimiter) == options.comment {
             continue;
         }
         let candidate = dialect(delimiter, false);
-        let (agreeing, _) = read(candidate).width();
+        let (agreeing, _) = most_frequent(&counts(&text[first.0..], candidate));
         if agreeing > most {
             (best, most) = (candidate, agreeing);
         }
     }
-    let lines = read(best);
-    if best.delimiter == b',' && lines.is_one_column_of_decimal_commas() {
+    let few = Lines::read(text, first, best, numbers, FEW_LINES);
+    let may_be_one_column = best.delimiter == b',' && few.is_one_column_of_decimal_commas();
+    if 2 * few.rows_of_values() > few.lines.len() && !may_be_one_column {
+        return best;
+    }
+    let lines = Lines::read(text, first, best, numbers, MOST_LINES);
+    if may_be_one_column && lines.is_one_column_of_decimal_commas() {
         return dialect(b';', false);
     }
     let separated = blanks::separated(text);
-    let by_blanks = Lines::read(&separated, first, dialect(b'\t', true), numbers, LINES);
-    if by_blanks.width().0 >= most && by_blanks.rows_of_values() > lines.rows_of_values() {
-        dialect(b'\t', true)
-    } else {
-        best
+    let by_blanks = Lines::read(&separated, first, dialect(b'\t', true), numbers, MOST_LINES);
+    let values = by_blanks.rows_of_values();
+    if by_blanks.width().0 >= most && values > lines.rows_of_values() { dialect(b'\t', true) } else { best }
+}
+
+/// How many fields the first lines of a text have, but for comments.
+fn counts(mut text: &[u8], dialect: Dialect) -> Vec<usize> {
+    let mut record = Record::new(dialect.delimiter);
+    let mut counts = Vec::new();
+    while counts.len() < MOST_LINES {
+        if let Some(length) = dialect.skipped_line(text) {
+            text = &text[length..];
+            continue;
+        }
+        let end = memchr::memchr(b'\n', text);
+        let plain = end.map(|end| &text[..end]).filter(|line| memchr::memchr(b'"', line).is_none());
+        let (count, length) = match plain {
+            Some(line) => (memchr::memchr_iter(dialect.delimiter, line).count() + 1, line.len() + 1),
+            None => match record.read(text) {
+                Some(length) => (record.len(), length),
+                None => break,
+            },
+        };
+        if mark(text, dialect).is_none() {
+            counts.push(count);
+        }
+        text = &text[length..];
+    }
+    counts
+}
+
+/// The sign with which a line begins if that is one of comments, although none were declared.
+fn mark(line: &[u8], dialect: Dialect) -> Option<u8> {
+    let content = line.trim_ascii_start();
+    let sign = content.first().copied().filter(|_| dialect.comment.is_none())?;
+    (MARKS.contains(&sign) || content.starts_with(b"//")).then_some(sign)
+}
+
+/// The most frequent number of fields, unless that is one, and how many lines have it.
+fn most_frequent(counts: &[usize]) -> (usize, usize) {
+    let mut sorted = counts.to_vec();
+    sorted.sort_unstable();
+    let runs = sorted.chunk_by(|a, b| a == b).map(|run| (run.len(), run[0]));
+    match runs.max() {
+        Some((lines, count)) if count > 1 => (lines, count),
+        _ => (0, 1),
     }
 }
 

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::data::{Offset, Regular, Rows, checked, shortest};
+use crate::data::{Offset, Regular, Resample, Rows, checked, shortest};
 use crate::figures::short;
 
 /// This many rows at the end that repeat one value in all channels are told.
@@ -167,7 +167,7 @@ impl Log {
     pub fn recorded(channels: Vec<Channel>, time: Vec<f64>) -> Result<Self, Error> {
         let Checked { rows, missing } = Checked::new(&channels)?;
         let median = median_step(&time, rows)?;
-        let gap = gap_above(&mut steps(&time).collect::<Vec<f64>>(), median);
+        let gap = gap_above(&time, median);
         let long = steps(&time).enumerate().filter(|(_, step)| *step > gap);
         let starts: Vec<usize> = long.map(|(position, _)| position + 1).collect();
         let irregular = irregularity(&time, median, &starts);
@@ -190,6 +190,19 @@ impl Log {
     /// [`Error::Data`] with the first row whose step is another.
     pub(crate) fn check_uniform(&self) -> Result<(), Error> {
         self.irregular.clone().map_or(Ok(()), Err)
+    }
+
+    /// The log on a uniform clock: as it is, or one of two rates resampled as [`Resample::for_two_rates`] says, which is given with it.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the first row whose step is another, for a log that is irregular otherwise.
+    pub fn on_one_rate(self) -> Result<(Self, Option<Resample>), Error> {
+        let Some(irregular) = self.irregular.clone() else { return Ok((self, None)) };
+        let time = self.time.unwrap_or_default();
+        match Resample::for_two_rates(&time)? {
+            Some(how) => Ok((Self::resampled(self.channels, &time, &how)?, Some(how))),
+            None => Err(irregular),
+        }
     }
 
     /// A log on a clock that is known to be uniform.
@@ -659,13 +672,14 @@ pub(super) fn steps(time: &[f64]) -> impl Iterator<Item = f64> {
     time.windows(2).map(|pair| pair[1] - pair[0])
 }
 
-/// From how many seconds on a step is a gap, by the steps and their median.
-pub(crate) fn gap_above(steps: &mut [f64], median: f64) -> f64 {
+/// From how many seconds on a step of a clock is a gap, by the median step.
+pub(crate) fn gap_above(time: &[f64], median: f64) -> f64 {
     let limit = GAP * median;
-    let long = steps.iter().filter(|step| **step > limit).count();
-    let few = (FEW * steps.len() as f64) as usize;
-    gap_of(limit, long as f64, steps.len() as f64, || {
-        let (_, step, _) = steps.select_nth_unstable_by(steps.len() - 1 - few, f64::total_cmp);
+    let (long, all) = (steps(time).filter(|step| *step > limit).count(), time.len().saturating_sub(1));
+    gap_of(limit, long as f64, all as f64, || {
+        let mut steps: Vec<f64> = steps(time).collect();
+        let few = (FEW * all as f64) as usize;
+        let (_, step, _) = steps.select_nth_unstable_by(all - 1 - few, f64::total_cmp);
         *step
     })
 }

@@ -88,10 +88,10 @@ impl Resample {
     /// ```
     pub fn for_two_rates(time: &[f64]) -> Result<Option<Self>, Error> {
         let median = median_step(time, time.len())?;
-        let mut all: Vec<f64> = steps(time).collect();
-        if gap_above(&mut all, median) <= GAP * median {
+        if gap_above(time, median) <= GAP * median {
             return Ok(None);
         }
+        let mut all: Vec<f64> = steps(time).collect();
         let step = coarser(time, &mut all).filter(|step| *step <= SLOWER * median);
         Ok(step.map(|step| Self { step, interpolation: Interpolation::Auto, anti_alias: false }))
     }
@@ -268,7 +268,7 @@ impl Log {
         let weights = filter.map(|filter| filter.weights(recorded, rows));
         let filtered = weights.as_ref().map(|weights| Filtered::new(&channels, time, recorded, weights));
         let gap = match interpolation {
-            Interpolation::Auto => gap_above(&mut steps(time).collect::<Vec<f64>>(), recorded),
+            Interpolation::Auto => gap_above(time, recorded),
             Interpolation::Hold | Interpolation::Linear => f64::INFINITY,
         };
         let in_gap = |instant: f64, left: usize| {

@@ -75,7 +75,7 @@ impl Ticks {
             ));
         };
         let median = shortest(median, 2.0 * f64::EPSILON * latest);
-        let gap = gap_above(&mut steps.clone(), median);
+        let gap = gap_above(time, median);
         let (gaps, regular): (Vec<f64>, Vec<f64>) = steps.iter().partition(|step| **step > gap);
         let off = |step: &&f64| (**step - median).abs() > JITTER * median;
         let count = regular.len().max(1) as f64;
@@ -95,12 +95,16 @@ impl Ticks {
             irregular: regular.iter().any(|step| off(&step)),
         };
         Ok(Self {
-            clock,
             backward: steps.iter().copied().filter(backward).count(),
             first_backward: steps.iter().position(backward).map(|position| position + 2),
             repeats: steps.iter().find(|step| backward(step)) == Some(&0.0),
             regular: Some(Regular::of(time, median)),
-            rates: if steps.iter().any(backward) { None } else { Resample::for_two_rates(time)? },
+            rates: if clock.irregular && !steps.iter().any(backward) {
+                Resample::for_two_rates(time)?
+            } else {
+                None
+            },
+            clock,
         })
     }
 

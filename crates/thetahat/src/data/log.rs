@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::data::{Offset, Regular, Resample, Rows, checked, shortest};
+use crate::data::{Offset, Regular, Rows, checked, shortest};
 use crate::figures::short;
 
 /// This many rows at the end that repeat one value in all channels are told.
@@ -190,19 +190,6 @@ impl Log {
     /// [`Error::Data`] with the first row whose step is another.
     pub(crate) fn check_uniform(&self) -> Result<(), Error> {
         self.irregular.clone().map_or(Ok(()), Err)
-    }
-
-    /// The log on a uniform clock: as it is, or one of two rates resampled as [`Resample::for_two_rates`] says, which is given with it.
-    ///
-    /// # Errors
-    /// [`Error::Data`] with the first row whose step is another, for a log that is irregular otherwise.
-    pub fn on_one_rate(self) -> Result<(Self, Option<Resample>), Error> {
-        let Some(irregular) = self.irregular.clone() else { return Ok((self, None)) };
-        let time = self.time.unwrap_or_default();
-        match Resample::for_two_rates(&time)? {
-            Some(how) => Ok((Self::resampled(self.channels, &time, &how)?, Some(how))),
-            None => Err(irregular),
-        }
     }
 
     /// A log on a clock that is known to be uniform.

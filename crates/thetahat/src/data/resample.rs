@@ -200,6 +200,19 @@ impl<'a> Filtered<'a> {
 }
 
 impl Log {
+    /// The log on a uniform clock: as it is, or one of two rates resampled as [`Resample::for_two_rates`] says, which is given with it.
+    ///
+    /// # Errors
+    /// [`Error::Data`] with the first row whose step is another, for a log that is irregular otherwise.
+    pub fn on_one_rate(self) -> Result<(Self, Option<Resample>), Error> {
+        let Err(irregular) = self.check_uniform() else { return Ok((self, None)) };
+        let time = self.time().unwrap_or_default();
+        match Resample::for_two_rates(time)? {
+            Some(how) => Ok((Self::resampled(self.channels().to_vec(), time, &how)?, Some(how))),
+            None => Err(irregular),
+        }
+    }
+
     /// A uniform log read off one with another clock, every `how.step` seconds from its first sample on.
     ///
     /// Without an anti-alias filter ([`Resample::filter_for`] says whether there is one) a value is missing where a sample that

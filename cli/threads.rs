@@ -19,9 +19,18 @@ pub(crate) fn share() {
     let count = asked.filter(|&count: &usize| count > 0).unwrap_or_else(cores);
     let (sender, receiver) = channel();
     let receiver = Arc::new(Mutex::new(receiver));
+    let (begins, is_begun) = channel();
+    // One after the other: a thread that has its stack and finds no memory for what it needs besides ends the process, and where all begin
+    // at once, those after it have taken that.
     let begin = |_| {
-        let receiver = Arc::clone(&receiver);
-        thread::Builder::new().spawn(move || serve(&receiver))
+        let (receiver, begins) = (Arc::clone(&receiver), begins.clone());
+        let begun = thread::Builder::new().spawn(move || {
+            // Who waits for it is there.
+            let _ = begins.send(());
+            serve(&receiver);
+        })?;
+        is_begun.recv().map_err(|_| io::Error::from(io::ErrorKind::BrokenPipe))?;
+        io::Result::Ok(begun)
     };
     let begun: Vec<thread::JoinHandle<()>> = (0..count).map_while(|index| begin(index).ok()).collect();
     // An earlier run in this process may have made the pool: then it stays, and the threads of this one end.

@@ -14,6 +14,12 @@ pub(super) struct Dialect {
 }
 
 impl Dialect {
+    /// Fields between bytes of this kind; a space stands for runs of blanks.
+    pub(super) fn new(delimiter: u8, comment: Option<u8>) -> Self {
+        let blanks = delimiter == b' ';
+        Self { delimiter: if blanks { b'\t' } else { delimiter }, comment, blanks }
+    }
+
     /// Whether a byte may surround the content of a field without being part of it.
     pub(super) fn is_blank(&self, byte: u8) -> bool {
         matches!(byte, b' ' | b'\t') && byte != self.delimiter
@@ -49,6 +55,13 @@ impl Dialect {
         } else {
             None
         }
+    }
+
+    /// The sign with which a line begins if that is one of comments, although none were declared.
+    pub(super) fn mark(&self, line: &[u8]) -> Option<u8> {
+        let content = line.trim_ascii_start();
+        let sign = content.first().copied().filter(|_| self.comment.is_none())?;
+        (matches!(sign, b'#' | b'%') || content.starts_with(b"//")).then_some(sign)
     }
 }
 

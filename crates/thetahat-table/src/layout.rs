@@ -174,24 +174,11 @@ impl Layout {
         Error::data(&self.file, row.position_of(found.min(width), self.dialect), message)
     }
 
-    /// The error for a text that ends inside quotes; the row is as much of it as there is.
-    pub(super) fn unclosed(&self, row: &Row<'_>) -> Error {
+    /// The error for a text (`the file`, `its line`) that ends inside quotes; the row is as much of it as there is.
+    pub(super) fn unclosed(&self, row: &Row<'_>, text: &str) -> Error {
         let position = row.position_of(row.record.len(), self.dialect);
-        Error::data(
-            &self.file,
-            position,
-            "this quote is not closed before the end of the file; close it, or take it away",
-        )
-    }
-
-    /// The error for a line that ends inside quotes.
-    pub(super) fn unclosed_in_line(&self, row: &Row<'_>) -> Error {
-        let position = row.position_of(row.record.len(), self.dialect);
-        Error::data(
-            &self.file,
-            position,
-            "this quote is not closed before the end of its line; close it, or take it away",
-        )
+        let message = format!("this quote is not closed before the end of {text}; close it, or take it away");
+        Error::data(&self.file, position, message)
     }
 
     /// The error for a row that is longer than `limit` bytes.

@@ -71,10 +71,15 @@ impl Numbers {
 
     /// Reads a whole field without blanks around it. A missing value is NaN; an error is a message.
     pub(super) fn read(&self, field: &[u8]) -> Result<f64, String> {
+        self.value(field).ok_or_else(|| self.refusal(field))
+    }
+
+    /// The same without the message.
+    pub(super) fn value(&self, field: &[u8]) -> Option<f64> {
         match self.finite(field) {
-            Some(value) => Ok(self.without_missing(value)),
-            None if self.is_missing(field) => Ok(f64::NAN),
-            None => self.declared(field).ok_or_else(|| self.refusal(field)),
+            Some(value) => Some(self.without_missing(value)),
+            None if self.is_missing(field) => Some(f64::NAN),
+            None => self.declared(field),
         }
     }
 

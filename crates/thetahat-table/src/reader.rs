@@ -1,17 +1,16 @@
 //! Reading a text table from its first byte to its last.
 
 use std::ops::ControlFlow;
-use std::sync::atomic::AtomicBool;
 
 use memchr::{memchr, memchr_iter, memrchr};
 
 use super::block::Block;
 use super::error::{Error, Position, quoted};
 use super::layout::{Layout, Row};
-use super::number::{NUL_BYTE, Numbers};
+use super::number::NUL_BYTE;
 use super::record::Record;
 use super::rows::{Plan, Rows};
-use super::shape::{self, Column, Shape};
+use super::shape::{self, Head, Shape};
 use super::source::Source;
 use super::stream::{Text, TextStream};
 use super::time::{Clock, Times};
@@ -40,10 +39,10 @@ pub(super) struct TextReader {
     options: Options,
     sizes: Sizes,
     source: Source,
-    layout: Layout,
+    /// What is known of the columns, and nothing to read as long as none is selected.
+    plan: Plan,
     /// The errors to report if a column with such a name is used.
     undecoded_names: Vec<(usize, Error)>,
-    numbers: Numbers,
     /// What the reader should know, in plain words.
     told: Vec<String>,
     /// The text at hand, and space for the text after it.
@@ -92,38 +91,31 @@ impl TextReader {
         if current.text().is_empty() {
             return Err(Error::data(&file, None, "the file is empty; record at least one row"));
         }
-        let Shape { dialect, start, line, columns, .. } = shape;
-        let numbers =
-            Numbers::new(shape.decimal_comma, &options.missing).with(shape.grouped, &options.values);
+        let Shape { dialect, mut head, columns, numbers } = shape;
+        let layout = Layout {
+            file,
+            dialect,
+            names: Vec::new(),
+            is_open: head.width.is_some(),
+            columns,
+            units: std::mem::take(&mut head.units),
+        };
         let mut reader = Self {
             options: options.clone(),
             sizes,
             source,
-            layout: Layout {
-                file,
-                dialect,
-                names: Vec::new(),
-                is_open: shape.width.is_some(),
-                columns,
-                units: shape.units,
-            },
+            told: head.words.iter().map(|words| layout.told(words)).collect(),
+            plan: Plan::new(layout, numbers),
             undecoded_names: Vec::new(),
-            numbers,
-            told: Vec::new(),
             current,
             next: Block::default(),
             record: Record::new(dialect.delimiter),
             position: 0,
             length: 0,
-            line,
+            line: head.line,
         };
-        reader.told = shape.words.iter().map(|words| reader.layout.told(words)).collect();
-        reader.pass(start)?;
-        reader.read_head(shape.has_names, shape.left_out, shape.width)?;
-        if let Some(names) = shape.names {
-            reader.layout.names =
-                names.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
-        }
+        reader.pass(head.start)?;
+        reader.read_head(head)?;
         Ok(reader)
     }
 
@@ -139,20 +131,24 @@ impl TextReader {
     }
 
     /// Reads the names of the columns, leaves out what is between them and the first row, and stops there.
-    fn read_head(&mut self, has_names: bool, left_out: usize, width: Option<usize>) -> Result<(), Error> {
-        if has_names {
+    fn read_head(&mut self, head: Head) -> Result<(), Error> {
+        if head.has_names {
             self.advance()?;
             self.read_names();
         }
-        for _ in 0..left_out {
+        for _ in 0..head.left_out {
             self.advance()?;
         }
         self.advance()?;
-        if !has_names {
-            self.layout.names = (1..=self.record.len()).map(|number| number.to_string()).collect();
+        let names = &mut self.plan.layout.names;
+        if !head.has_names {
+            *names = (1..=self.record.len()).map(|number| number.to_string()).collect();
         }
-        if let Some(width) = width {
-            self.layout.names.truncate(width);
+        if let Some(width) = head.width {
+            names.truncate(width);
+        }
+        if let Some(known) = head.names {
+            *names = known;
         }
         Ok(())
     }
@@ -160,7 +156,7 @@ impl TextReader {
     /// Takes the names from the row at hand.
     fn read_names(&mut self) {
         for index in 0..self.record.len() {
-            let name = self.layout.dialect.trimmed(self.record.field(index));
+            let name = self.plan.layout.dialect.trimmed(self.record.field(index));
             let text = String::from_utf8_lossy(name).into_owned();
             // It is there as well if the name was decoded by a wrong encoding.
             if text.contains(char::REPLACEMENT_CHARACTER) {
@@ -168,9 +164,9 @@ impl TextReader {
                     "its name {} is not UTF-8; name the file's encoding, as in `encoding` windows-1252",
                     quoted(name)
                 );
-                self.undecoded_names.push((index, self.layout.fault(&self.row(), index, &message)));
+                self.undecoded_names.push((index, self.plan.layout.fault(&self.row(), index, &message)));
             }
-            self.layout.names.push(text);
+            self.plan.layout.names.push(text);
         }
     }
 
@@ -181,7 +177,7 @@ impl TextReader {
         self.position += self.length;
         loop {
             let rest = &self.current.text()[self.position..];
-            if let Some(length) = self.layout.dialect.skipped_line(rest) {
+            if let Some(length) = self.plan.layout.dialect.skipped_line(rest) {
                 self.position += length;
                 self.line += 1;
             } else if let Some(length) = self.record.read(rest) {
@@ -190,9 +186,13 @@ impl TextReader {
             } else if self.current.is_last() {
                 let row = Row { record: &self.record, text: rest, line: self.line };
                 let empty = rest.is_empty();
-                return Err(if empty { self.layout.no_rows(self.line) } else { self.layout.unclosed(&row) });
+                return Err(if empty {
+                    self.plan.layout.no_rows(self.line)
+                } else {
+                    self.plan.layout.unclosed(&row, "the file")
+                });
             } else if rest.len() > self.sizes.row {
-                return Err(self.layout.too_long(self.line, self.sizes.row));
+                return Err(self.plan.layout.too_long(self.line, self.sizes.row));
             } else {
                 let amount = self.sizes.block.max(self.current.carried());
                 self.next.fill(rest, amount, &mut self.source)?;
@@ -210,31 +210,31 @@ impl TextReader {
 
     /// The names of the columns, as they are in the header; without one they are numbered from `1`.
     pub(super) fn names(&self) -> &[String] {
-        &self.layout.names
+        &self.plan.layout.names
     }
 
     /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
     /// is a number, and not all are missing.
     pub(super) fn words(&self) -> Vec<bool> {
-        let of = |column| self.layout.columns.get(column).is_some_and(|column: &Column| column.no_numbers);
-        (0..self.layout.width()).map(of).collect()
+        let of = |column: usize| self.plan.layout.columns.get(column).is_some_and(|column| column.no_numbers);
+        (0..self.plan.layout.width()).map(of).collect()
     }
 
     /// Further words that the reader should know.
     #[cfg(feature = "spreadsheets")]
     pub(super) fn tell(&mut self, words: &[String]) {
-        let words = words.iter().map(|words| self.layout.told(words));
+        let words = words.iter().map(|words| self.plan.layout.told(words));
         self.told.splice(0..0, words);
     }
 
     /// The columns that are clocks by their names and their first values.
     pub(super) fn times(&self) -> Vec<ClockColumns> {
-        self.layout.clocks()
+        self.plan.layout.clocks()
     }
 
     /// The columns that are called as clocks are, or hold dates.
     pub(super) fn called_clocks(&self) -> Vec<usize> {
-        self.layout.called_clocks()
+        self.plan.layout.called_clocks()
     }
 
     /// The columns of which the name is not UTF-8 and cannot be shown.
@@ -250,15 +250,12 @@ impl TextReader {
         progress: &mut dyn FnMut(u64, Option<u64>),
         take: &mut dyn FnMut(Table) -> ControlFlow<()>,
     ) -> Result<(), Error> {
-        let fields = self.fields(selection)?;
-        let times = self.clock(selection)?;
-        let start = times.start.clone();
+        self.select(selection)?;
         let Self {
             options,
             sizes,
             mut source,
-            layout,
-            numbers,
+            plan,
             told,
             mut current,
             mut next,
@@ -267,14 +264,6 @@ impl TextReader {
             line,
             ..
         } = self;
-        let plan = Plan {
-            layout,
-            numbers,
-            times,
-            fields,
-            time: selection.time,
-            has_statuses: AtomicBool::new(false),
-        };
         let mut rows = Rows::new(plan.fields.len(), line);
         let mut tallies = vec![Tally::default(); plan.fields.len()];
         loop {
@@ -303,10 +292,10 @@ impl TextReader {
             if current.is_last() {
                 if !left.is_empty() {
                     let row = Row { record: &record, text: left, line: rows.line };
-                    return Err(plan.layout.unclosed(&row));
+                    return Err(plan.layout.unclosed(&row, "the file"));
                 }
                 progress(source.bytes_read(), source.total());
-                let mut last = plan.table(rows, selection, start, &mut tallies);
+                let mut last = plan.table(rows, selection, &mut tallies);
                 last.words = told.into_iter().chain(plan.told()).chain(plan.counted(&tallies)).collect();
                 let _ = take(last);
                 return Ok(());
@@ -321,8 +310,7 @@ impl TextReader {
             position = 0;
             if most.is_some_and(|most| rows.count >= most) {
                 let after = Rows::new(plan.fields.len(), rows.line);
-                let part =
-                    plan.table(std::mem::replace(&mut rows, after), selection, start.clone(), &mut tallies);
+                let part = plan.table(std::mem::replace(&mut rows, after), selection, &mut tallies);
                 if take(part).is_break() {
                     return Ok(());
                 }
@@ -339,29 +327,23 @@ impl TextReader {
         whole_lines: bool,
         start: Option<&str>,
     ) -> Result<TextStream, Error> {
-        let fields = self.fields(selection)?;
-        let mut times = self.clock(selection)?;
-        if let (Some(start), Some(_)) = (start, &times.start) {
-            times =
-                times.counted_from(start).map_err(|message| Error::data(&self.layout.file, None, message))?;
+        self.select(selection)?;
+        let Self { source, mut plan, mut told, current, position, line, .. } = self;
+        if let (Some(start), Some(_)) = (start, &plan.times.start) {
+            let times = std::mem::take(&mut plan.times).counted_from(start);
+            plan.times = times.map_err(|message| Error::data(&plan.layout.file, None, message))?;
         }
-        let first = times.start.clone();
-        let Self { source, layout, numbers, mut told, current, position, line, .. } = self;
-        let text = current.raw().get(position..).unwrap_or_default().to_vec();
-        let plan = Plan {
-            layout,
-            numbers,
-            times,
-            fields,
-            time: selection.time,
-            has_statuses: AtomicBool::new(false),
-        };
         told.extend(plan.told());
-        TextStream::begin(
-            plan,
-            selection,
-            Text { text, line, source, whole_lines, start: first, words: told },
-        )
+        let text = current.raw().get(position..).unwrap_or_default().to_vec();
+        TextStream::begin(plan, selection, Text { text, line, source, whole_lines, words: told })
+    }
+
+    /// Plans to read the selected columns.
+    fn select(&mut self, selection: &Selection) -> Result<(), Error> {
+        self.plan.fields = self.fields(selection)?;
+        self.plan.times = self.clock(selection)?;
+        self.plan.time = selection.time;
+        Ok(())
     }
 
     /// The selected fields in ascending order, if the selection makes sense.
@@ -369,12 +351,15 @@ impl TextReader {
         let all = selection.columns.iter().copied().chain(selection.time).chain(selection.date);
         let mut fields: Vec<usize> = all.collect();
         fields.sort_unstable();
-        let unusable = |message| Err(Error::data(&self.layout.file, None, message));
+        let unusable = |message| Err(Error::data(&self.plan.layout.file, None, message));
         if let Some(twice) = fields.windows(2).find(|pair| pair[0] == pair[1]) {
-            return unusable(format!("{} is selected twice; select it once", self.layout.column(twice[0])));
+            return unusable(format!(
+                "{} is selected twice; select it once",
+                self.plan.layout.column(twice[0])
+            ));
         }
-        if let Some(beyond) = fields.iter().find(|&&field| field >= self.layout.width()) {
-            let width = self.layout.width();
+        if let Some(beyond) = fields.iter().find(|&&field| field >= self.plan.layout.width()) {
+            let width = self.plan.layout.width();
             return unusable(format!("there is no column {}; select from the first {width}", beyond + 1));
         }
         match self.undecoded_names.iter().find(|(index, _)| fields.contains(index)) {
@@ -387,13 +372,13 @@ impl TextReader {
     fn clock(&mut self, selection: &Selection) -> Result<Times, Error> {
         let Selection { time: Some(time), date, .. } = *selection else { return Ok(Times::default()) };
         // A row of another width is refused when it is read.
-        if self.record.len() < self.layout.width() {
+        if self.record.len() < self.plan.layout.width() {
             return Ok(Times::default());
         }
         let own = self.column_clock(time)?;
         let days = date.map(|date| self.column_clock(date)).transpose()?;
         let row = self.row();
-        let field = |column| self.layout.dialect.trimmed(row.record.field(column));
+        let field = |column| self.plan.layout.dialect.trimmed(row.record.field(column));
         let start = match (&days, date) {
             (Some(days), Some(date)) => days.start_at(&own).or_else(|| days.start(field(date))),
             _ => own.start(field(time)),
@@ -404,16 +389,16 @@ impl TextReader {
     /// How the times of a column are read.
     fn column_clock(&mut self, column: usize) -> Result<Clock, Error> {
         let row = self.row();
-        let field = self.layout.dialect.trimmed(row.record.field(column));
-        let fault = |message: String| self.layout.first_fault(&row, column, &message);
-        let recognised = self.layout.times(column, &self.options).map_err(fault)?;
+        let field = self.plan.layout.dialect.trimmed(row.record.field(column));
+        let fault = |message: String| self.plan.layout.first_fault(&row, column, &message);
+        let recognised = self.plan.layout.times(column, &self.options).map_err(fault)?;
         let clock = match &recognised {
-            Some(known) => Clock::begin(field, &known.written, &self.numbers),
-            None => Clock::decide(field, self.options.time_format.as_deref(), &self.numbers),
+            Some(known) => Clock::begin(field, &known.written, &self.plan.numbers),
+            None => Clock::decide(field, self.options.time_format.as_deref(), &self.plan.numbers),
         };
         let clock = clock.map_err(fault)?;
         if let Some(told) = recognised.and_then(|known| known.told) {
-            self.told.push(self.layout.told(&format!("{}: {told}", self.layout.column(column))));
+            self.told.push(self.plan.layout.told(&format!("{}: {told}", self.plan.layout.column(column))));
         }
         Ok(clock)
     }

@@ -122,18 +122,23 @@ struct Read {
 }
 
 impl Plan {
+    /// Nothing is read yet.
+    pub(super) fn new(layout: Layout, numbers: Numbers) -> Self {
+        let has_statuses = AtomicBool::new(false);
+        Self { layout, numbers, times: Times::default(), fields: Vec::new(), time: None, has_statuses }
+    }
+
+    /// The place of a field among those that are read.
+    pub(super) fn place(&self, field: usize) -> usize {
+        self.fields.binary_search(&field).unwrap_or_default()
+    }
+
     /// Makes a table of the rows, its columns in the order of the selection.
-    pub(super) fn table(
-        &self,
-        mut rows: Rows,
-        selection: &Selection,
-        start: Option<String>,
-        tallies: &mut [Tally],
-    ) -> Table {
-        let place = |field: &usize| self.fields.binary_search(field).unwrap_or_default();
+    pub(super) fn table(&self, mut rows: Rows, selection: &Selection, tallies: &mut [Tally]) -> Table {
         rows.columns.iter_mut().for_each(|column| column.truncate(rows.count));
         self.count(&mut rows.columns, tallies);
-        let mut take = |field| rows.columns.get_mut(place(field)).map(std::mem::take).unwrap_or_default();
+        let mut take =
+            |field: &usize| rows.columns.get_mut(self.place(*field)).map(std::mem::take).unwrap_or_default();
         Table {
             columns: selection.columns.iter().map(&mut take).collect(),
             time: selection.time.as_ref().map(|time| {
@@ -143,7 +148,7 @@ impl Plan {
                 }
                 times
             }),
-            start,
+            start: self.times.start.clone(),
             calendar: Calendar::None,
             rows: rows.count,
             lines: rows.lines,

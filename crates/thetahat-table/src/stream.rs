@@ -43,7 +43,6 @@ pub(super) struct TextStream {
     any: bool,
     /// Whether a last line without a line break is left alone.
     whole_lines: bool,
-    start: Option<String>,
     /// What the reader should know, in plain words, and was not told yet.
     words: Vec<String>,
     /// The statuses of which that was said, by field.
@@ -62,8 +61,6 @@ pub(super) struct Text {
     pub(super) source: Source,
     /// Whether a last line without a line break is left alone.
     pub(super) whole_lines: bool,
-    /// The time that dates count from, as it is written.
-    pub(super) start: Option<String>,
     /// What the reader should know, in plain words.
     pub(super) words: Vec<String>,
 }
@@ -72,13 +69,13 @@ impl TextStream {
     /// # Errors
     /// That the system has no thread that reads ahead.
     pub(super) fn begin(plan: Plan, selection: &Selection, text: Text) -> Result<Self, Error> {
-        let Text { text, line, source, whole_lines, start, words } = text;
+        let Text { text, line, source, whole_lines, words } = text;
         let mailbox = Mailbox::new();
         let (spent, empty) = channel();
         let pieces = mailbox.sender();
         let begun = thread::Builder::new().spawn(move || read(source, &pieces, &empty));
         begun.map_err(|error| Error::no_thread(&plan.layout.file, &error))?;
-        let place = |field: &usize| plan.fields.binary_search(field).unwrap_or_default();
+        let place = |field: &usize| plan.place(*field);
         Ok(Self {
             fields: vec![0.0; plan.fields.len()],
             values: vec![0.0; selection.columns.len()],
@@ -95,7 +92,6 @@ impl TextStream {
             next_line: line,
             any: false,
             whole_lines,
-            start,
             ended: false,
             mailbox,
             spent,
@@ -109,7 +105,7 @@ impl TextStream {
 
     /// The time that dates count from, as it is written; none if times are numbers.
     pub(super) fn start(&self) -> Option<&str> {
-        self.start.as_deref()
+        self.plan.times.start.as_deref()
     }
 
     /// The row at hand, in the order of the selection; NaN is a missing value.
@@ -210,7 +206,7 @@ impl TextStream {
                 let read = if whole {
                     self.plan.values(&row, !self.any, &mut self.fields)
                 } else {
-                    Err(layout.unclosed_in_line(&row))
+                    Err(layout.unclosed(&row, "its line"))
                 };
                 if let Err(error) = read {
                     event = Event::Malformed(error);

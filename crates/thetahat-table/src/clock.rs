@@ -149,35 +149,36 @@ fn dates(dates: &[String]) -> Result<Option<Recognised>, String> {
         found.iter().filter(|format| rises(&read(dates, format.as_deref()))).collect();
     // Where not one of them rises, the order of the rows says nothing.
     let fitting = if rising.is_empty() { found.iter().collect() } else { rising };
-    let shown = |format: &Option<String>| format.clone().unwrap_or_default();
-    let durations = dates.iter().all(|date| time::duration(date.as_bytes()).is_some());
+    let first = dates.first().map_or("", String::as_str);
+    let read_in = |format: &Option<String>, told| {
+        Ok(Some(Recognised { written: Written::Dates(format.clone()), told }))
+    };
     match fitting.as_slice() {
-        // More hours than a day has, or more minutes than an hour.
-        [] if durations => Ok(Some(Recognised { written: Written::Durations, told: None })),
-        [] => Ok(None),
-        [only] if only.as_deref() == Some("%H:%M") => Ok(Some(Recognised {
-            written: Written::Dates((*only).clone()),
-            told: Some(format!(
-                "times such as {} are read as hours and minutes; give them with seconds if they are minutes and seconds",
-                dates.first().map_or("", String::as_str)
-            )),
-        })),
-        [only] => Ok(Some(Recognised { written: Written::Dates((*only).clone()), told: None })),
-        [one, other, ..] if same_steps(dates, one, other) => Ok(Some(Recognised {
-            written: Written::Dates((*one).clone()),
-            told: Some(format!(
-                "dates such as {} are read as `time-format` '{}'; '{}' fits them too",
-                dates.first().map_or("", String::as_str),
-                shown(one),
-                shown(other)
-            )),
-        })),
-        [one, other, ..] => Err(format!(
-            "dates such as {} can be read in two ways; say which: `time-format` '{}' or '{}'",
-            dates.first().map_or("", String::as_str),
-            shown(one),
-            shown(other)
-        )),
+        [] => {
+            // More hours than a day has, or more minutes than an hour.
+            let are_durations = dates.iter().all(|date| time::duration(date.as_bytes()).is_some());
+            Ok(are_durations.then_some(Recognised { written: Written::Durations, told: None }))
+        }
+        [only] => {
+            let is_short = only.as_deref() == Some("%H:%M");
+            let told = is_short.then(|| {
+                format!(
+                    "times such as {first} are read as hours and minutes; give them with seconds if they are minutes and seconds"
+                )
+            });
+            read_in(only, told)
+        }
+        [one, other, ..] => {
+            let [a, b] = [one, other].map(|format| format.as_deref().unwrap_or_default());
+            if same_steps(dates, one, other) {
+                let told =
+                    format!("dates such as {first} are read as `time-format` '{a}'; '{b}' fits them too");
+                return read_in(one, Some(told));
+            }
+            Err(format!(
+                "dates such as {first} can be read in two ways; say which: `time-format` '{a}' or '{b}'"
+            ))
+        }
     }
 }
 

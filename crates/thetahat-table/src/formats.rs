@@ -8,7 +8,9 @@ use std::path::Path;
 use super::error::Error;
 use super::mailbox::{Event, Waker};
 use super::reader::{SIZES, TextReader};
-use super::source::{Bytes, Format, Source};
+#[cfg(any(feature = "columnar", feature = "spreadsheets"))]
+use super::source::Format;
+use super::source::{Bytes, Source};
 #[cfg(feature = "spreadsheets")]
 use super::spreadsheet::{self, Sheet};
 use super::stream::TextStream;

@@ -71,7 +71,7 @@ pub(super) fn of(name: &str, unit: Option<&str>) -> Option<Option<Unit>> {
     if NAMES.contains(&lower.as_str()) {
         return Some(unit.and_then(|unit| Unit::of(&bare(unit))));
     }
-    // A unit behind the name.
+    // A unit after the name.
     let ends = |from: usize| {
         let (base, unit) = (lower.get(..from)?, lower.get(from..)?);
         let base = base.trim_end_matches([' ', '_', '/', ',', '-', '.', '(', '[', '<']);

@@ -17,8 +17,8 @@ pub(super) struct Block {
     carried: usize,
     /// Whether the text ends with this block.
     last: bool,
-    /// Whether the last newline is not in the text.
-    closed: bool,
+    /// Whether the text ends without a line break: its last newline was added here.
+    unended: bool,
 }
 
 impl Block {
@@ -29,7 +29,7 @@ impl Block {
 
     /// The bytes as they were read.
     pub(super) fn raw(&self) -> &[u8] {
-        &self.memory[..self.length - usize::from(self.closed)]
+        &self.memory[..self.length - usize::from(self.unended)]
     }
 
     /// How many of the bytes were in the block before.
@@ -40,6 +40,11 @@ impl Block {
     /// Whether nothing follows this block.
     pub(super) fn is_last(&self) -> bool {
         self.last
+    }
+
+    /// Whether the text ends in this block, and without a line break.
+    pub(super) fn is_unended(&self) -> bool {
+        self.unended
     }
 
     /// Starts over with the bytes that the block before left, and reads up to `amount` more.
@@ -54,12 +59,12 @@ impl Block {
         self.carried = left.len();
         self.length = left.len() + read;
         self.last = read < amount;
-        self.closed = false;
+        self.unended = false;
         // So that every line ends alike.
         if self.last && self.text().last().is_some_and(|&byte| byte != b'\n') {
             self.memory[self.length] = b'\n';
             self.length += 1;
-            self.closed = true;
+            self.unended = true;
         }
         Ok(())
     }

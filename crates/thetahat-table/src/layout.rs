@@ -161,6 +161,19 @@ impl Layout {
         } else {
             "add what is missing, if only the delimiters"
         };
+        self.uneven(row, advice)
+    }
+
+    /// The error for a last row without a line break and with too few fields.
+    pub(super) fn cut(&self, row: &Row<'_>) -> Error {
+        self.uneven(
+            row,
+            "this is the last line and has no line break: it was probably cut; delete this line, or add what is missing",
+        )
+    }
+
+    fn uneven(&self, row: &Row<'_>, advice: &str) -> Error {
+        let (found, width) = (row.record.len(), self.width());
         let message = format!(
             "this row has {}, but there {} {} ({} separates them); {advice}",
             counted(found, "field"),

@@ -272,7 +272,7 @@ impl TextReader {
             // What is given in parts needs no room for all.
             let share = source.share_read().filter(|_| most.is_none());
             let (read, filled) = rayon::join(
-                || plan.read(whole, sizes.piece, share, &mut record, &mut rows),
+                || plan.read(whole, current.is_unended(), sizes.piece, share, &mut record, &mut rows),
                 || {
                     if current.is_last() {
                         return Ok(());
@@ -309,7 +309,7 @@ impl TextReader {
             std::mem::swap(&mut current, &mut next);
             position = 0;
             if most.is_some_and(|most| rows.count >= most) {
-                let after = Rows::new(plan.fields.len(), rows.line);
+                let after = rows.after();
                 let part = plan.table(std::mem::replace(&mut rows, after), selection, &mut tallies);
                 if take(part).is_break() {
                     return Ok(());

@@ -51,12 +51,24 @@ pub(super) struct Rows {
     pub(super) count: usize,
     /// The number of the line after the last one read.
     pub(super) line: u64,
+    /// Whether there were rows before these, in a part that was given away.
+    later: bool,
 }
 
 impl Rows {
     /// No rows yet, with the next one on `line`.
     pub(super) fn new(columns: usize, line: u64) -> Self {
         Self { columns: vec![Vec::new(); columns], line, ..Self::default() }
+    }
+
+    /// No rows yet, with the next one after these.
+    pub(super) fn after(&self) -> Self {
+        Self { later: self.has_any(), ..Self::new(self.columns.len(), self.line) }
+    }
+
+    /// Whether there was a row, here or before.
+    pub(super) fn has_any(&self) -> bool {
+        self.count > 0 || self.later
     }
 
     /// Adds a row that takes this many lines.
@@ -160,10 +172,12 @@ impl Plan {
     /// `piece_size` bytes. The text is about this `share` of all there is from the first row on, with what was read before;
     /// none if nobody knows.
     ///
-    /// Returns how much of the text was read: all of it, unless a quoted field goes on after it.
+    /// Returns how much of the text was read: all of it, unless a quoted field goes on after it. `unended` is whether the
+    /// log ends with this text, and without a line break: a last row with too few fields was cut.
     pub(super) fn read(
         &self,
         text: &[u8],
+        unended: bool,
         piece_size: usize,
         share: Option<f64>,
         record: &mut Record,
@@ -191,7 +205,7 @@ impl Plan {
                 break;
             }
         }
-        Ok(taken + self.read_carefully(&text[taken..], record, rows)?)
+        Ok(taken + self.read_carefully(&text[taken..], unended, record, rows)?)
     }
 
     /// Reads rows up to the first that needs care.
@@ -281,7 +295,8 @@ impl Plan {
         }
     }
 
-    /// The same of any value.
+    /// Reads the value at the front of a text, whatever it is, and returns it with the length of its field, unless it needs
+    /// care.
     #[inline(never)]
     fn value(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
         let dialect = self.layout.dialect;
@@ -366,7 +381,13 @@ impl Plan {
     }
 
     /// Reads rows by all the rules, and returns the length of their text.
-    fn read_carefully(&self, text: &[u8], record: &mut Record, rows: &mut Rows) -> Result<usize, Error> {
+    fn read_carefully(
+        &self,
+        text: &[u8],
+        unended: bool,
+        record: &mut Record,
+        rows: &mut Rows,
+    ) -> Result<usize, Error> {
         let layout = &self.layout;
         let mut values = vec![0.0; self.fields.len()];
         let mut taken = 0;
@@ -379,7 +400,10 @@ impl Plan {
             }
             let Some(length) = record.read(rest) else { break };
             let row = Row { record, text: &rest[..length], line: rows.line };
-            self.values(&row, rows.count == 0, &mut values)?;
+            if unended && length == rest.len() && record.len() < layout.width() {
+                return Err(layout.cut(&row));
+            }
+            self.values(&row, !rows.has_any(), &mut values)?;
             rows.push(&values, memchr_iter(b'\n', row.text).count() as u64);
             taken += length;
         }

@@ -1,8 +1,8 @@
-//! What the first lines of a text show: what separates its fields, which line has the names, where the rows begin, and how
-//! numbers are written.
+//! What the first lines of a text show: what separates its fields, which line has the names, where the rows begin, and
+//! how numbers are written.
 //!
-//! The names are the last line of words above the rows that has as many fields as they; units may stand between. What is
-//! above is left out. Whatever was not certain is said in [`Head::words`], with the option that says otherwise.
+//! The names are the last line of words above the rows that has as many fields as they; units may stand between. What
+//! is above is left out. Whatever was not certain is said in [`Head::words`], with the option that says otherwise.
 
 mod columns;
 mod delimiter;

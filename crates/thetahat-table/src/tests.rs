@@ -11,6 +11,7 @@ use super::reader::{SIZES, Sizes, TextReader};
 use super::source::{Bytes, Source};
 use super::*;
 
+mod cut;
 mod random;
 mod shapes;
 mod stream;

@@ -16,9 +16,9 @@ const MOST_LINES: usize = 1000;
 /// Where most of so many lines are values, there is nothing to doubt.
 const FEW_LINES: usize = 32;
 
-/// The first lines of a text, divided by the delimiter that is given, or named in the first line, or by the one that most lines
-/// have equally often. A text in which most lines have none has one column. Blanks are it where they alone make values of what
-/// is between them.
+/// The first lines of a text, divided by the delimiter that is given, or named in the first line, or by the one that
+/// most lines have equally often. A text in which most lines have none has one column. Blanks are the delimiter where
+/// they alone make values of what is between them.
 pub(super) fn divided<'t>(text: &'t [u8], options: &Options, numbers: &Numbers) -> Lines<'t> {
     let (first, named) = separator(text);
     let dialect = |delimiter| Dialect::new(delimiter, options.comment);

@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 95] = [
+pub(crate) const OPTIONS: [&str; 98] = [
     "alarm",
     "alpha",
     "alphas",
@@ -45,8 +45,10 @@ pub(crate) const OPTIONS: [&str; 95] = [
     "method",
     "minimum-variance",
     "missing",
+    "model",
     "most-terms",
     "name",
+    "narx",
     "nf",
     "nk",
     "no-header",
@@ -81,6 +83,7 @@ pub(crate) const OPTIONS: [&str; 95] = [
     "split",
     "start",
     "step",
+    "structure",
     "term",
     "terms",
     "time",

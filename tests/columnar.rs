@@ -74,7 +74,7 @@ fn every_verb_reads_them() {
         folder.done(&format!("validate model.json {name} --time when"));
         let json = folder.done(&format!("inspect {name} --time when --format json")).stdout;
         let inspection: Value = serde_json::from_str(&json).unwrap();
-        let left_out = inspection["warnings"].to_string();
+        let left_out = inspection["findings"].to_string();
         assert!(left_out.contains("('note') is left out: it holds no numbers"), "{left_out}");
     }
 }

@@ -15,8 +15,17 @@ fn inspected(folder: &Folder, line: &str) -> Value {
 }
 
 fn says(document: &Value, what: &str) -> bool {
-    let warnings = document["warnings"].as_array().into_iter().flatten();
-    warnings.filter_map(Value::as_str).any(|warning| warning.contains(what))
+    sentences(document).iter().any(|sentence| sentence.contains(what))
+}
+
+/// The findings of a document, as the table has them.
+fn sentences(document: &Value) -> Vec<String> {
+    let findings = document["findings"].as_array().expect("there is a list of findings");
+    let sentence = |finding: &Value| {
+        let words = [&finding["seen"], &finding["advice"]].into_iter().filter_map(Value::as_str);
+        words.collect::<Vec<_>>().join(": ")
+    };
+    findings.iter().map(sentence).collect()
 }
 
 /// Runs the line that a document ends with, in a shell, with orders.
@@ -62,7 +71,7 @@ fn the_document_says_what_the_log_is() {
     let correlation = numbers(&document["delays"][0]["correlation"]);
     assert!(correlation[1].abs() > 3.0 * number(&document, "/delays/0/band"));
     assert_eq!(document["command"], "thetahat fit log.csv --sample-time 0.5 -u u -y y --report model.json");
-    assert_eq!(document["warnings"], json!([]));
+    assert_eq!(document["findings"], json!([]));
     assert_fits(&folder, &document);
 }
 
@@ -212,7 +221,7 @@ fn all_columns_of_numbers_are_looked_at() {
     assert_eq!(channels, [(&json!("u2"), &input), (&json!("u1"), &input), (&json!("y"), &output)]);
     for word in ["column 2 ('note') is left out: it holds no numbers", "column 7 ('when')", "column 6 ('x')"]
     {
-        assert!(says(&document, word), "{word}: {}", document["warnings"]);
+        assert!(says(&document, word), "{word}: {:?}", sentences(&document));
     }
     // In the order of a fit.
     let inputs: Vec<&Value> =
@@ -221,12 +230,7 @@ fn all_columns_of_numbers_are_looked_at() {
     // Named columns, and nothing else; one that holds words is then an error.
     let document = inspected(&folder, "log.csv -u u1 -y u2");
     assert_eq!(document["channels"].as_array().map(Vec::len), Some(2));
-    assert_eq!(
-        document["warnings"]
-            .as_array()
-            .map(|warnings| warnings.iter().filter(|w| w.to_string().contains("left out")).count()),
-        Some(0)
-    );
+    assert!(!says(&document, "left out"), "{:?}", sentences(&document));
     let line = folder.refused("inspect log.csv -u note", 3);
     assert!(line.contains("log.csv:2:") && line.contains("column 'note'"), "{line}");
     // Words among numbers are a fault and not another kind of column.
@@ -364,7 +368,7 @@ fn a_sensor_that_is_stuck_is_named_with_its_rows() {
     rest[..100].fill(0.0);
     folder.write("log.csv", csv(&[("u", &u), ("rest", &rest), ("steps", &steps), ("switch", &switch)]));
     let document = inspected(&folder, "log.csv");
-    assert!(!says(&document, "stands still"), "{}", document["warnings"]);
+    assert!(!says(&document, "stands still"), "{:?}", sentences(&document));
 }
 
 #[test]
@@ -380,7 +384,7 @@ fn outliers_that_another_channel_explains_are_none() {
     let u: Vec<f64> = (0..600).map(|row| blow(row) + 0.01 * random.uniform()).collect();
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     let document = inspected(&folder, "log.csv");
-    assert!(!says(&document, "far from their neighbours"), "{}", document["warnings"]);
+    assert!(!says(&document, "far from their neighbours"), "{:?}", sentences(&document));
     // A glitch of the sensor is one.
     let mut y = y;
     y[370] = 80.0;
@@ -406,9 +410,54 @@ fn one_step_is_no_sample_of_feedback_and_delays() {
         .collect();
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     let document = inspected(&folder, "log.csv");
-    assert!(!says(&document, "feedback is suspected"), "{}", document["warnings"]);
+    assert!(!says(&document, "feedback is suspected"), "{:?}", sentences(&document));
     assert_eq!(document["feedback"][0]["p_value"], Value::Null);
     let certain = document["delays"][0]["confidence"].as_f64().is_none_or(|confidence| confidence >= 0.5);
     assert!(certain, "{}", document["delays"][0]);
     assert!(says(&document, "whether the input follows the output cannot be told"));
+}
+
+#[test]
+fn findings_name_their_channels_and_rows() {
+    // Values that are missing, a sensor at its limit, a time that jumps and an outlier.
+    let mut random = crate::signals::Random::new(12);
+    let u: Vec<f64> = (0..400).map(|_| random.uniform()).collect();
+    let mut y: Vec<f64> =
+        (0..400).map(|row| 3.0 * (0.05 * row as f64).sin() + 0.01 * random.uniform()).collect();
+    y.iter_mut().for_each(|value| *value = value.min(2.5));
+    (y[100], y[101], y[205], y[300]) = (f64::NAN, f64::NAN, f64::NAN, 90.0);
+    let mut text = "t,u,y\n".to_owned();
+    for row in 0..400 {
+        let time = if row < 250 { row } else { row + 40 };
+        let value = if y[row].is_nan() { String::new() } else { y[row].to_string() };
+        text += &format!("{time},{},{value}\n", u[row]);
+    }
+    let folder = Folder::with_log(text);
+    let document = inspected(&folder, "log.csv --time t");
+    let find = |kind: &str| {
+        let found = document["findings"].as_array().and_then(|all| all.iter().find(|of| of["kind"] == kind));
+        found.unwrap_or_else(|| panic!("{kind}: {:?}", sentences(&document))).clone()
+    };
+    assert_eq!(find("gaps")["rows"], json!([[251, 251]]));
+    assert_eq!(find("gaps").get("channels"), None);
+    let missing = find("missing");
+    assert_eq!((&missing["channels"], &missing["rows"]), (&json!(["y"]), &json!([[101, 102], [206, 206]])));
+    assert_eq!(missing["seen"], "channel 'y' misses 3 of 400 values");
+    assert_eq!(find("outliers")["rows"], json!([[301, 301]]));
+    // Part by part the same.
+    let parts = inspected(&folder, "log.csv --time t --stream");
+    assert_eq!(parts["findings"], document["findings"]);
+
+    // A sensor at its limit, in runs.
+    let clipped: Vec<f64> = (0..400).map(|row| (3.0 * (0.05 * row as f64).sin()).min(2.5)).collect();
+    folder.write("log.csv", csv(&[("u", &u), ("y", &clipped)]));
+    let document = inspected(&folder, "log.csv");
+    let kind = |finding: &&Value| finding["kind"] == "saturation";
+    let rests = document["findings"].as_array().and_then(|all| all.iter().find(kind)).expect("it saturates");
+    let rows = rests["rows"].as_array().expect("there are rows");
+    for row in rows {
+        let [first, last] = [0, 1].map(|end| row[end].as_u64().unwrap_or(0) as usize);
+        assert!(last > first && clipped[first - 1..last].iter().all(|value| *value == 2.5), "{row}");
+    }
+    assert_eq!(rows.len(), 3);
 }

@@ -17,6 +17,7 @@ mod control;
 mod convert;
 mod criterion;
 mod csv_dialects;
+mod decisions;
 mod demo_and_help;
 mod design;
 mod draws;

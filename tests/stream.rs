@@ -219,7 +219,7 @@ fn an_inspection_of_a_stream_tells_what_the_whole_tells() {
     assert_eq!(whole["excitation"][0]["order"], stream["excitation"][0]["order"]);
     assert_eq!((&stream["delays"][0]["nk"], &whole["delays"][0]["nk"]), (&json!(1), &json!(1)));
     assert_eq!(stream["command"], whole["command"]);
-    let words = stream["warnings"].to_string();
+    let words = stream["findings"].to_string();
     // An input that does not step is not that of a step test, of which the rest before it would be missed.
     assert!(words.contains("those of the first 100000 rows") && !words.contains("left out"), "{words}");
     // A pipe gives the same bytes, and the number of threads does not matter.

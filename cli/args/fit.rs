@@ -309,6 +309,8 @@ pub(crate) enum MapArgument {
     RbfFree,
     /// Of polynomials and networks the one with the best free run on rows held out
     Auto,
+    /// A linear model, where the data choose
+    None,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -322,6 +324,11 @@ pub(crate) enum MembershipArgument {
 }
 
 impl MapArgument {
+    /// The functions, unless there are to be none.
+    pub(crate) fn asked(given: Option<Self>) -> Option<Self> {
+        given.filter(|map| *map != Self::None)
+    }
+
     /// As it is written on the command line.
     pub(crate) fn word(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())

@@ -14,7 +14,7 @@ use super::experiments::{Experiments, experiments};
 use super::pieces::PiecesJob;
 use super::search::{Identified, Telling};
 use super::{grey_box, narx, process, state_space, stored, summary};
-use crate::args::{EachArguments, FitArguments, FormatArgument};
+use crate::args::{EachArguments, FitArguments, FormatArgument, MapArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
 use crate::log;
@@ -68,7 +68,7 @@ fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
     if let Some(model) = &arguments.grey {
         return Ok(Resolved::GreyBox(Box::new(GreyBoxJob::resolve(arguments, model)?)));
     }
-    if let Some(map) = arguments.narx.narx.filter(|_| !arguments.stream) {
+    if let Some(map) = MapArgument::asked(arguments.narx.narx).filter(|_| !arguments.stream) {
         return Ok(Resolved::Narx(Box::new(NarxJob::resolve(arguments, map)?)));
     }
     if let Some(job) = ProcessJob::resolve(arguments)? {

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use thetahat::data::{Recording, Source, Times};
+use thetahat::data::{Finding, Recording, Source, Times};
 use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
@@ -62,7 +62,7 @@ fn one(arguments: &InspectArguments, log: &Path) -> Result<Done, Failure> {
     let mut job = InspectJob::resolve(&own)?;
     job.log.quiet = true;
     let (inspection, _) = inspected(&job, &own)?;
-    Done::new(&inspection, inspection.row(), Vec::new(), &inspection.warnings)
+    Done::new(&inspection, inspection.row(), Vec::new(), &inspection.warnings())
 }
 
 /// Reads the log and inspects it. What was read is there for a page, if one was asked for.
@@ -76,7 +76,7 @@ pub(crate) fn inspected(
     } else {
         whole(job, arguments.html.is_some())?
     };
-    inspection.warnings.splice(0..0, words);
+    inspection.findings.splice(0..0, words.into_iter().map(Finding::reading));
     inspection.command = job.command(arguments, &inspection);
     Ok((inspection, kept))
 }

@@ -10,7 +10,7 @@ use thetahat::select::Choice;
 use super::experiments::{Channels, Wanted, wanted};
 use super::search::{Identified, Telling};
 use super::{narx, state_space};
-use crate::args::FitArguments;
+use crate::args::{FitArguments, MapArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, LogJob, NarxJob, StateSpaceJob};
 use crate::log::{self, Piece};
@@ -29,7 +29,7 @@ pub type Making = Box<dyn Fn(&Log, &[Source], usize) -> Result<NormalEquations, 
 impl PiecesJob {
     /// A log that is there already may have several outputs without their names.
     pub(crate) fn resolve(arguments: &FitArguments, has_several: bool) -> Result<Self, Failure> {
-        if let Some(map) = arguments.narx.narx {
+        if let Some(map) = MapArgument::asked(arguments.narx.narx) {
             return Ok(Self::NonlinearArx(Box::new(NarxJob::resolve(arguments, map)?)));
         }
         if let Some(job) = StateSpaceJob::resolve(arguments, has_several)? {

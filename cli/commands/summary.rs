@@ -376,6 +376,9 @@ fn interval(interval: Interval) -> String {
 /// A figure and its interval, or its standard error where there is none.
 fn quantity(quantity: Quantity) -> String {
     if let Some(known) = quantity.interval {
+        if known == Interval::OPEN {
+            return "not determined by this log".to_owned();
+        }
         return format!("{}, 95 % interval {}", number(quantity.value), interval(known));
     }
     let spread = quantity.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));

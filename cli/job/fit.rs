@@ -8,7 +8,7 @@ use thetahat::select::{Focus, Select};
 use super::orders::OrderJob;
 use super::{LogJob, method, parsed, rows};
 use crate::args::{
-    ConstantArgument, FitArguments, InitialArgument, LikelihoodArgument, ModelArguments, Names,
+    ConstantArgument, FitArguments, InitialArgument, LikelihoodArgument, MapArgument, ModelArguments, Names,
 };
 use crate::failure::Failure;
 use crate::memory::PerValue;
@@ -41,7 +41,8 @@ pub(crate) struct FitJob {
 
 impl FitJob {
     pub(crate) fn resolve(arguments: &FitArguments) -> Result<Self, Failure> {
-        let orders = OrderJob::resolve(&arguments.model, arguments.choice.path)?;
+        let orders = OrderJob::resolve(&arguments.model, arguments.choice.path)?
+            .linear(arguments.narx.narx == Some(MapArgument::None));
         let mut job = Self {
             paths: arguments.logs.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,

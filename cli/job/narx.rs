@@ -134,7 +134,7 @@ pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
         ("--raw-terms", arguments.raw_terms),
     ];
     match given.iter().find(|(_, given)| *given) {
-        Some((option, _)) if arguments.narx.is_none() => {
+        Some((option, _)) if MapArgument::asked(arguments.narx).is_none() => {
             Err(Failure::usage(format!("{option} is for --narx; leave it out, or give --narx")))
         }
         _ => Ok(()),
@@ -193,6 +193,7 @@ fn map_plan(arguments: &NarxArguments, map: MapArgument, seed: Option<u64>) -> R
         Step => Ok(MapPlan::Network { activation: Activation::Step, units: arguments.units, drawn: true }),
         RbfFree => Ok(MapPlan::FreeRadial { units: arguments.units }),
         Auto => Ok(MapPlan::Auto),
+        MapArgument::None => Err(Failure::usage("--narx none fits no nonlinear model; name the functions")),
     }
 }
 

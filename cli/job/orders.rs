@@ -11,7 +11,7 @@ pub(crate) enum OrderJob {
     /// Values or ranges.
     Given(Grid),
     /// The data choose.
-    Open { structure: Option<Structure>, inputs: bool, nk: Vec<usize> },
+    Open { structure: Option<Structure>, inputs: bool, nk: Vec<usize>, linear: bool },
 }
 
 impl ModelArgument {
@@ -114,6 +114,7 @@ impl OrderJob {
                 structure: model.map(ModelArgument::structure).transpose()?,
                 inputs: takes_inputs && !no_inputs,
                 nk: nk.iter().map(single).collect::<Result<_, _>>()?,
+                linear: false,
             });
         }
         // Of a general model, what is not given is not there.
@@ -242,6 +243,16 @@ impl OrderJob {
         }
     }
 
+    /// The same without nonlinear models, where the data choose.
+    pub(crate) fn linear(self, is_linear: bool) -> Self {
+        match self {
+            Self::Open { structure, inputs, nk, linear } => {
+                Self::Open { structure, inputs, nk, linear: linear || is_linear }
+            }
+            given @ Self::Given(_) => given,
+        }
+    }
+
     /// The choice for this many inputs: one value stands for all of them.
     pub(crate) fn of(&self, inputs: usize) -> Result<Choice, Failure> {
         let lengths = |argument: &str, count: usize| {
@@ -255,14 +266,14 @@ impl OrderJob {
         };
         let failed = |error| Failure::option(&error);
         let grid = match self {
-            Self::Open { structure, nk, .. } => {
+            Self::Open { structure, nk, linear, .. } => {
                 lengths("--nk", nk.len())?;
                 let each = match nk[..] {
                     [] => None,
                     [one] => Some(vec![one; inputs]),
                     _ => Some(nk.clone()),
                 };
-                return Ok(Choice::Automatic(Automatic { structure: *structure, nk: each }));
+                return Ok(Choice::Automatic(Automatic { structure: *structure, nk: each, linear: *linear }));
             }
             Self::Given(grid) => grid,
         };

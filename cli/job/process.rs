@@ -50,10 +50,12 @@ impl ProcessJob {
         }
         let free_start = match own.initial {
             InitialArgument::Auto => {
-                arguments.from.is_none() && structures.iter().all(ProcessStructure::is_transfer_function)
+                let free =
+                    arguments.from.is_none() && structures.iter().all(ProcessStructure::is_transfer_function);
+                free.then_some(true)
             }
-            InitialArgument::Zero => false,
-            InitialArgument::Estimate => true,
+            InitialArgument::Zero => Some(false),
+            InitialArgument::Estimate => Some(true),
             InitialArgument::Drop => {
                 return Err(Failure::usage(
                     "--initial drop is for models of past outputs; a process starts from zero, which is at rest, or estimate",

@@ -19,13 +19,13 @@ pub fn inspection(inspection: &Inspection, width: usize) -> String {
     quality(&mut text, &brief.channels);
     more(&mut text, inspection.channels.len(), brief.channels.len(), "channels");
     inputs(&mut text, &brief);
-    for warning in &brief.warnings {
-        text.line(&format!("warning: {}", harmless(warning)));
+    for warning in brief.warnings() {
+        text.line(&format!("warning: {}", harmless(&warning)));
     }
-    if !brief.warnings.is_empty() {
+    if !brief.findings.is_empty() {
         text.line("");
     }
-    more(&mut text, inspection.warnings.len(), brief.warnings.len(), "warnings");
+    more(&mut text, inspection.findings.len(), brief.findings.len(), "warnings");
     if let Some(command) = &inspection.command {
         text.verbatim(&harmless(command));
     }
@@ -106,8 +106,8 @@ fn quality(text: &mut Text, channels: &[ChannelQuality]) {
             channel.repeated.to_string(),
             channel.longest_hold.to_string(),
             or_dash(channel.quantization, short),
-            or_dash(channel.saturation, |saturation| saturation.low.to_string()),
-            or_dash(channel.saturation, |saturation| saturation.high.to_string()),
+            or_dash(channel.saturation.as_ref(), |saturation| saturation.low.to_string()),
+            or_dash(channel.saturation.as_ref(), |saturation| saturation.high.to_string()),
             channel.outlier_count.to_string(),
         ]);
     }

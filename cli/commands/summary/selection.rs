@@ -21,6 +21,10 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
         text.line(&format!("split: {}; the model is fitted to all but the test part", named.join(", ")));
         text.line("");
     }
+    report.decisions.iter().for_each(|decision| text.line(&decision.to_string()));
+    if !report.decisions.is_empty() {
+        text.line("");
+    }
     let Some(selection) = &report.selection else { return };
     selection.steps.iter().for_each(|step| text.line(step));
     text.line("");

@@ -5,6 +5,7 @@
 //! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a gap.
 //!   A [`JointRecord`] has any number of outputs.
 //! - [`mended`] makes a clock rise that stood still or went back where it is certain how.
+//! - A [`Finding`] is what a careful reader should know of a log, of a [`FindingKind`]; a [`Decision`] is what a fit did because of one.
 //! - [`Rows`] and [`Split`] say which rows serve for what. Rows are counted from 1, and a range includes both ends.
 //! - [`Detrend`] finds the [`Offset`] of each channel, [`Prefilter`] is a band of frequencies.
 //! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by [`Interpolation`], after a
@@ -23,6 +24,7 @@
 //! ```
 
 mod digest;
+mod finding;
 mod joint_record;
 mod log;
 mod mend;
@@ -39,6 +41,7 @@ mod split;
 mod tests;
 
 pub(crate) use digest::{digest, digests, inside, text_digest};
+pub use finding::{Decision, Finding, FindingKind};
 pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
 pub(crate) use log::{GAP, JITTER, Padding, check, gap_above, gap_of, measured};

@@ -4,7 +4,7 @@
 //!   [`InspectionPlan`] names the channels. [`PiecewiseInspection`] takes a log of any length part by part.
 //! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
 //!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output
-//!   ([`Feedback`]).
+//!   ([`Feedback`]). What a careful reader should know of all that is a list of [`Finding`](crate::data::Finding)s.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log, Rows, Source};
@@ -24,8 +24,10 @@ mod channel;
 mod clock;
 mod delay;
 mod excitation;
+mod findings;
 mod inspection;
 mod moments;
+mod named;
 mod outliers;
 mod pieces;
 mod plan;
@@ -37,10 +39,9 @@ mod saturation;
 mod spectrum;
 #[cfg(test)]
 mod tests;
-mod warnings;
 mod whitening;
 
-pub(crate) use excitation::{excitation, order_with_mean};
+pub(crate) use excitation::{excitation, is_few_sinusoids, order_with_mean};
 pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,
 };

@@ -47,6 +47,7 @@ mod held_out_runs;
 mod html;
 mod identify;
 mod nonlinear_arx;
+mod nonlinear_choice;
 mod normal_equations;
 mod pending;
 mod plan;
@@ -75,9 +76,8 @@ pub use html::{
     tuning_page, validation_page,
 };
 pub use identify::{identify, identify_monitored};
-pub use nonlinear_arx::{
-    Centres, InputLags, MapPlan, NonlinearArxPlan, fit_nonlinear_arx, fit_nonlinear_arx_monitored,
-};
+pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+pub use nonlinear_choice::{fit_nonlinear_arx, fit_nonlinear_arx_monitored};
 pub use normal_equations::NormalEquations;
 pub use pending::PendingEvaluation;
 pub use plan::Plan;

@@ -39,6 +39,7 @@ mod held_out_mse;
 mod linear;
 mod processes;
 mod ranking;
+mod rival;
 mod search;
 mod selection;
 mod states;
@@ -51,9 +52,11 @@ pub(crate) use automatic::constant_pays;
 pub use choice::{Automatic, Choice, Grid, OrderRange, Path, Select};
 pub(crate) use choose::choose;
 pub use choose::choose_orders;
+pub(crate) use compare::few_for_blocks;
 pub(crate) use delay::{delays, delays_of};
 pub use focus::Focus;
 pub(crate) use processes::{is_step_test, processes};
+pub(crate) use rival::on_blocks;
 pub use selection::{
     Best, Candidate, Delay, DelayScore, HeldOut, ProcessCandidate, Selection, StateSpaceCandidate,
 };

@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `search` chooses one, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
@@ -22,9 +22,9 @@ Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 from thetahat._control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat._design import ExperimentDesign, TestSignal, design
 from thetahat._filter import StateEstimate, StateFilter, StateTrajectory
-from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, general, oe, search
+from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, fit, general, oe, search
 from thetahat._grey_box import GreyBox, grey
-from thetahat._evaluation import Comparison, Inspection, Validation, compare, inspect
+from thetahat._evaluation import Comparison, Finding, Inspection, Validation, compare, inspect
 from thetahat._instrumental import iv, sriv
 from thetahat._log import Log
 from thetahat._many import Fits, fit_many
@@ -34,6 +34,7 @@ from thetahat._normal_equations import NormalEquations
 from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
 from thetahat._process import process, tf
 from thetahat._read import dc_motor, read_csv, read_log
+from thetahat._report import Decision
 from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat._spectrum import MeasuredResponse, spectrum
 from thetahat._state_model import StateModel
@@ -80,6 +81,7 @@ __all__ = [
     "ChangeTrajectory",
     "Comparison",
     "Control",
+    "Decision",
     "DesignOptions",
     "EquationsOptions",
     "EstimationError",
@@ -87,6 +89,7 @@ __all__ = [
     "ExperimentDesign",
     "ExtendedKalmanFilter",
     "FilterTrajectory",
+    "Finding",
     "FitOptions",
     "Fits",
     "Forecast",
@@ -149,6 +152,7 @@ __all__ = [
     "dc_motor",
     "design",
     "fir",
+    "fit",
     "fit_many",
     "general",
     "grey",

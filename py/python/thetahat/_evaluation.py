@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -183,6 +184,46 @@ class Comparison(_Document):
         return f"Comparison({', '.join(str(model['report']) for model in self.document['models'])})"
 
 
+@dataclass(frozen=True)
+class Finding:
+    """What was found in a log that a careful reader should know. Its ``str`` is the sentence that the command line prints.
+
+    Attributes
+    ----------
+    kind : str
+        What kind of thing it is, such as ``"gaps"``, ``"outliers"``, ``"stuck"``, ``"feedback"`` or ``"trend"``.
+    channels : list of str
+        The channels that it is about; none where it is the whole log.
+    rows : list of (int, int)
+        The rows where it is seen, as (first, last) counted from 1, the first 20 ranges; none where it is all rows.
+    seen : str
+        The evidence, with its figures.
+    advice : str or None
+        What it means, or what to do about it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> y = np.sin(0.1 * np.arange(200.0) ** 2)
+    >>> y[120] = 50.0
+    >>> found = th.inspect(th.Log(y=y, sample_time=1.0)).findings[0]
+    >>> found.kind, found.channels, found.rows
+    ('outliers', ['y'], [(121, 121)])
+    >>> print(found)
+    channel 'y' has values far from their neighbours at row 121: where they are wrong, empty their fields, or fit with norm=1
+    """
+
+    kind: str
+    channels: list[str]
+    rows: list[tuple[int, int]]
+    seen: str
+    advice: str | None
+
+    def __str__(self) -> str:
+        return self.seen if self.advice is None else f"{self.seen}: {self.advice}"
+
+
 class Inspection(_Document):
     """What a log is worth before any fit: the document of ``thetahat inspect``.
 
@@ -193,6 +234,27 @@ class Inspection(_Document):
     >>> inspection.delays, inspection.feedback
     ({'u': 1}, {'u': False})
     """
+
+    @property
+    def findings(self) -> list[Finding]:
+        """What a careful reader should know: what was seen, in which channels and rows, and what to do."""
+
+        def of(found: dict[str, Any]) -> Finding:
+            advice = found.get("advice")
+            return Finding(
+                found["kind"],
+                found.get("channels", []),
+                [(first, last) for first, last in found.get("rows", [])],
+                _thetahat.in_python(found["seen"]),
+                None if advice is None else _thetahat.in_python(advice),
+            )
+
+        return [of(found) for found in self.document["findings"]]
+
+    @property
+    def warnings(self) -> list[str]:
+        """The findings in plain words, each in a sentence."""
+        return [str(finding) for finding in self.findings]
 
     @property
     def delays(self) -> dict[str, int | None]:

@@ -537,6 +537,57 @@ def fir(
     return _fit("fir", locals(), *words)
 
 
+def fit(
+    log: Log,
+    *,
+    narx: str | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit the model that the data ask for.
+
+    Delay, structure and orders are chosen. A step test may come to a process in continuous time (see `process`), so may a level that follows
+    the sum of its input; a plant of many modes to a model in state space (see `ss`), one that is far from linear to a nonlinear ARX model
+    (see `narx`). What was found in the log and what was done because of it is in `Model.decisions`, what was compared in `Model.selection`.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    narx : {"none"}, optional
+        No nonlinear model.
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, time_limit
+        What to fit to and what the model is for, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        The one that was chosen, fitted to all rows but those of a test part.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.fit(th.dc_motor()).kind
+    'armax'
+    """
+    more = [] if narx is None else [f"--narx={_options.text('narx', narx)}"]
+    return _fit(None, locals(), *more)
+
+
 def search(
     log: Log,
     model: str | None = None,
@@ -575,9 +626,7 @@ def search(
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
-    Without orders the data choose delay, structure and orders, and a step test may come to a process in continuous time (see `process`),
-    a plant of many modes to a model in state space (see `ss`).
-    `Model.selection` holds what was compared.
+    Without orders the data choose delay, structure and orders, as `fit` has it. `Model.selection` holds what was compared.
 
     Parameters
     ----------

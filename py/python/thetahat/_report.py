@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +16,43 @@ from thetahat import _numbers, _options, _thetahat
 Array = npt.NDArray[np.float64]
 
 _STATES = ("state-space", "continuous-state-space")
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What a fit did by itself because of what it found in the log. Its ``str`` is the sentence that the command line prints.
+
+    Attributes
+    ----------
+    kind : str
+        What was found: ``"feedback"``, ``"integration"``, ``"nonlinear"``, ``"few_sinusoids"`` or ``"in_motion"``.
+    channels : list of str
+        The channels that it is about; none where it is the whole log.
+    because : str
+        The evidence, with its figures.
+    did : str
+        What was done.
+    instead : str
+        The argument that says otherwise.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> u = np.sin(0.3 * np.arange(400.0))
+    >>> y = np.convolve(u, 0.5 ** np.arange(1, 20))[:400] + 0.01 * np.random.default_rng(1).standard_normal(400)
+    >>> [decision.kind for decision in th.fit(th.Log(u=u, y=y, sample_time=1.0)).decisions]
+    ['few_sinusoids']
+    """
+
+    kind: str
+    channels: list[str]
+    because: str
+    did: str
+    instead: str
+
+    def __str__(self) -> str:
+        return f"{self.because}: {self.did} ({self.instead} says otherwise)"
 
 
 class ReportedModel:
@@ -381,6 +419,16 @@ class ReportedModel:
     def fits(self) -> list[dict[str, Any]]:
         """How well the model fits: one entry for each part of the log and horizon."""
         return list(self.document["fit"])
+
+    @property
+    def decisions(self) -> list[Decision]:
+        """What the fit did by itself because of what it found in the log."""
+
+        def of(made: dict[str, Any]) -> Decision:
+            because, did, instead = (_thetahat.in_python(made[word]) for word in ("because", "did", "instead"))
+            return Decision(made["kind"], made.get("channels", []), because, did, instead)
+
+        return [of(made) for made in self.document.get("decisions", [])]
 
     @property
     def selection(self) -> dict[str, Any] | None:

@@ -95,18 +95,22 @@ impl Padding {
         }
         Ok(Some(Self { rows: Rows::new((rows + 1).saturating_sub(last), rows)? }))
     }
+
+    /// What is seen of it.
+    pub(crate) fn seen(&self) -> String {
+        let (first, rows) = (self.rows.first(), self.rows.len());
+        format!("from row {first} to the end ({rows} rows) no channel changes, as in a log that was padded")
+    }
+
+    /// What to do about it.
+    pub(crate) fn advice(&self) -> String {
+        format!("leave these rows out (`estimate` 1..{}) unless the plant rested", self.rows.first() - 1)
+    }
 }
 
 impl fmt::Display for Padding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let first = self.rows.first();
-        write!(
-            f,
-            "from row {first} to the end ({} rows) no channel changes, as in a log that was padded: leave these rows out \
-             (`estimate` 1..{}) unless the plant rested",
-            self.rows.len(),
-            first - 1
-        )
+        write!(f, "{}: {}", self.seen(), self.advice())
     }
 }
 

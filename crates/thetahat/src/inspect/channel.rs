@@ -2,6 +2,7 @@
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 
+use super::named::{NAMED, ranges};
 use super::{ChannelQuality, moments, outliers, quantization, saturation};
 use crate::data::{Channel, Rows, Times};
 
@@ -46,9 +47,6 @@ pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usiz
     quality.outliers = left.into_iter().take(NAMED).collect();
 }
 
-/// The first rows of outliers that are named.
-pub(super) const NAMED: usize = 20;
-
 /// A run of equal values of so many rows may be a sensor that is stuck.
 const STUCK: usize = 20;
 /// And so many times the longest other one.
@@ -89,6 +87,7 @@ pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> (
     let count = rows.as_ref().map_or(all.len(), Vec::len);
     let mut quality = ChannelQuality {
         missing: all.len() - count,
+        missing_rows: ranges(rows.iter().flat_map(|_| (0..all.len()).filter(|&row| all[row].is_nan()))),
         repeated: all.windows(2).filter(|pair| pair[0] == pair[1]).count(),
         longest_hold: saturation::runs(all).map(|run| run.rows).max().unwrap_or(0),
         stuck: stuck(all),

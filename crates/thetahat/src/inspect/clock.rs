@@ -2,7 +2,7 @@
 
 use thetahat_numerics::regression::sum;
 
-use super::Clock;
+use super::{Clock, named::NAMED};
 use crate::Error;
 use crate::data::{JITTER, Regular, Resample, Times, gap_above, shortest};
 
@@ -38,6 +38,7 @@ impl Ticks {
                     steps: (*step, *step),
                     jitter: 0.0,
                     gaps: 0,
+                    gap_rows: Vec::new(),
                     irregular: false,
                 };
                 return Ok(Self::forward(clock));
@@ -92,6 +93,11 @@ impl Ticks {
             }),
             jitter,
             gaps: gaps.len(),
+            gap_rows: (0..steps.len())
+                .filter(|&row| steps[row] > gap)
+                .map(|row| row + 2)
+                .take(NAMED)
+                .collect(),
             irregular: regular.iter().any(|step| off(&step)),
         };
         Ok(Self {
@@ -129,16 +135,26 @@ impl Ticks {
             steps: (f64::INFINITY, f64::NEG_INFINITY),
             jitter: 0.0,
             gaps: 0,
+            gap_rows: Vec::new(),
             irregular: false,
         };
         let mut joined = Self::forward(clock);
         let (mut square, mut count) = (0.0, 0.0);
-        // One row has no step.
-        for time in times.filter(|time| time.len() > 1) {
+        let mut before = 0;
+        for time in times {
+            // One row has no step.
+            if time.len() < 2 {
+                before += time.len();
+                continue;
+            }
             let own = Self::new(&Times::Measured(time.to_vec()), time.len())?.clock;
             let (low, high) = joined.clock.steps;
             joined.clock.steps = (low.min(own.steps.0), high.max(own.steps.1));
             joined.clock.gaps += own.gaps;
+            let named = joined.clock.gap_rows.len();
+            let own_rows = own.gap_rows.iter().map(|row| before + row);
+            joined.clock.gap_rows.extend(own_rows.take(NAMED - named));
+            before += time.len();
             let steps = (time.len() - 1 - own.gaps) as f64;
             square += steps * own.jitter * own.jitter;
             count += steps;

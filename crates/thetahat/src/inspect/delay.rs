@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-8;
 const BAND: f64 = 1.959_963_984_540_054;
 
 /// Puts in the delays of all inputs together, as a fit without orders finds them: see `select::delay`. Inputs that never change
-/// have none.
+/// have none; `follows` says which follow the output.
 ///
 /// The signals are deviations.
 pub(super) fn estimate(
@@ -34,6 +34,7 @@ pub(super) fn estimate(
     inputs: &[Vec<f64>],
     output: &[f64],
     segments: &[Range<usize>],
+    follows: &[bool],
 ) -> Result<(), Error> {
     let moving: Vec<usize> =
         (0..inputs.len()).filter(|&input| inputs[input].iter().any(|value| *value != 0.0)).collect();
@@ -51,7 +52,8 @@ pub(super) fn estimate(
         record.inputs.push(&ones);
     }
     let names: Vec<String> = moving.iter().map(|&input| found[input].input.clone()).collect();
-    for (&input, delay) in moving.iter().zip(delays(&record, &names)?) {
+    let follows: Vec<bool> = moving.iter().map(|&input| follows[input]).collect();
+    for (&input, delay) in moving.iter().zip(delays(&record, &names, &follows)?) {
         found[input].confidence = delay.confidence;
         found[input].nk = delay.confidence.map(|_| delay.nk);
     }

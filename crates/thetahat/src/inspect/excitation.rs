@@ -17,6 +17,9 @@ const SAMPLES: usize = 4;
 /// An eigenvalue below this fraction of the largest counts as zero.
 const TOLERANCE: f64 = 1e-6;
 
+/// Up to this order of excitation an input is a sum of a few sinusoids: of three.
+const SINUSOIDS: usize = 6;
+
 /// Of the square of a signal, what is left by another one is rounding below this fraction.
 pub(super) const SAME: f64 = 1e-20;
 /// The mean squares of signals that are the same differ by less than this fraction.
@@ -58,6 +61,19 @@ pub(crate) fn excitation(
         spectrum: spectrum::spectrum(&deviations, segments, unit, sample_time),
         same_as: None,
     }
+}
+
+/// Whether a signal is a sum of a few sinusoids, about its mean: then it shows the response at their frequencies, and nothing of
+/// that at rest, nor of delays. A signal of few changes is that of a step test, and none.
+pub(crate) fn is_few_sinusoids(values: &[f64], segments: &[Range<usize>]) -> bool {
+    let pairs = || segments.iter().flat_map(|segment| values[segment.clone()].windows(2));
+    let changes = pairs().filter(|pair| pair[0] != pair[1]).count();
+    let highest = highest(segments);
+    if 2 * changes < pairs().count() || highest <= SINUSOIDS {
+        return false;
+    }
+    let order = rank(&moments::deviations(values, segments), segments, highest, Level::Removed);
+    (1..=SINUSOIDS).contains(&order)
 }
 
 /// Inputs that are the same as an earlier one but for scale and offset, each with the first such one. `segments` gives those in

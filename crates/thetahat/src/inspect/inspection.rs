@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Document;
-use crate::data::{Rows, Source};
+use crate::data::{Finding, Rows, Source};
 use crate::document::document_methods;
 use crate::validate::feedback;
 
@@ -38,8 +38,8 @@ pub struct Inspection {
     pub rest: Option<usize>,
     /// The command that would fit a model to it; none without an output.
     pub command: Option<String>,
-    /// What a careful reader should know, in plain words.
-    pub warnings: Vec<String>,
+    /// What a careful reader should know, in the order in which it is best read.
+    pub findings: Vec<Finding>,
 }
 
 fn one() -> usize {
@@ -64,6 +64,9 @@ pub struct Clock {
     pub jitter: f64,
     /// Steps longer than 1.5 medians.
     pub gaps: usize,
+    /// The first rows (20 at most) after a gap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub gap_rows: Vec<usize>,
     /// Whether the log has to be resampled before a fit.
     pub irregular: bool,
 }
@@ -77,6 +80,9 @@ pub struct ChannelQuality {
     pub role: Option<String>,
     /// Rows without a value.
     pub missing: usize,
+    /// The first of them (20 ranges at most).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing_rows: Vec<Rows>,
     /// The smallest value; none if there is no value. The same holds for the others.
     pub minimum: Option<f64>,
     /// The largest value.
@@ -107,12 +113,35 @@ pub struct ChannelQuality {
 }
 
 /// How often a channel rests at its limits.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Saturation {
     /// Rows at the smallest value, in runs of several.
     pub low: usize,
     /// Rows at the largest value, in runs of several.
     pub high: usize,
+    /// The first runs (20 at most) at the smallest value.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub low_rows: Vec<Rows>,
+    /// The first runs (20 at most) at the largest value.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub high_rows: Vec<Rows>,
+}
+
+impl Saturation {
+    /// So many rows at the limits, and the runs that they are; none where there are no such rows.
+    pub(super) fn of(
+        low: usize,
+        high: usize,
+        low_rows: impl FnOnce() -> Vec<Rows>,
+        high_rows: impl FnOnce() -> Vec<Rows>,
+    ) -> Option<Self> {
+        (low + high > 0).then(|| Self {
+            low,
+            high,
+            low_rows: if low > 0 { low_rows() } else { Vec::new() },
+            high_rows: if high > 0 { high_rows() } else { Vec::new() },
+        })
+    }
 }
 
 /// How rich an input is.
@@ -232,6 +261,7 @@ impl ChannelQuality {
             name: name.to_owned(),
             role: role.map(str::to_owned),
             missing: 0,
+            missing_rows: Vec::new(),
             minimum: None,
             maximum: None,
             mean: None,
@@ -262,19 +292,21 @@ pub(super) const FEW_CHANGES: f64 = 5.0;
 pub(super) const UNSURE: f64 = 0.5;
 
 impl Inspection {
+    /// The findings in plain words, each in a sentence.
+    pub fn warnings(&self) -> Vec<String> {
+        self.findings.iter().map(ToString::to_string).collect()
+    }
+
     /// How many times an input changes.
     pub(super) fn changes(&self, input: &str) -> f64 {
         let pairs = self.log.rows.len().saturating_sub(1) as f64;
         self.excitation.iter().find(|of| of.input == input).map_or(0.0, |of| of.changes * pairs)
     }
 
-    /// Takes back what a few changes of an input cannot show: they follow what they will, and one response is no sample of delays.
+    /// Takes back an uncertain delay of an input that changes a few times: one response is no sample of delays.
     pub(super) fn doubt_steps(&mut self) {
         let few: Vec<String> = self.excitation.iter().map(|of| of.input.clone()).collect();
         let few: Vec<String> = few.into_iter().filter(|input| self.changes(input) <= FEW_CHANGES).collect();
-        for feedback in self.feedback.iter_mut().filter(|of| few.contains(&of.input)) {
-            (feedback.p_value, feedback.explained, feedback.found) = (None, None, false);
-        }
         for delay in self.delays.iter_mut().filter(|of| few.contains(&of.input)) {
             if delay.confidence.is_some_and(|confidence| confidence < UNSURE) {
                 (delay.nk, delay.confidence) = (None, None);
@@ -295,8 +327,8 @@ impl Inspection {
     }
 
     /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before the inputs,
-    /// these before the others, and among them those first with the most to say of. Warnings are cut to as many. A log of
-    /// up to twice as many channels, or warnings, keeps all of them. O(M log M) for M channels.
+    /// these before the others, and among them those first with the most to say of. Findings are cut to as many. A log of
+    /// up to twice as many channels, or findings, keeps all of them. O(M log M) for M channels.
     pub fn brief(&self, most: usize) -> Self {
         let role = |channel: &ChannelQuality| match channel.role.as_deref() {
             Some("output") => 2,
@@ -324,7 +356,7 @@ impl Inspection {
             feedback: only(&self.feedback, |of| names.contains(of.input.as_str())),
             rest: self.rest,
             command: self.command.clone(),
-            warnings: self.warnings[..shown(self.warnings.len())].to_vec(),
+            findings: self.findings[..shown(self.findings.len())].to_vec(),
         }
     }
 }

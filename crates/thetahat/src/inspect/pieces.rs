@@ -14,9 +14,9 @@ use rayon::prelude::*;
 
 use super::clock::Ticks;
 use super::run::{self, roles};
-use super::{Inspection, InspectionPlan, warnings};
+use super::{Inspection, InspectionPlan, findings};
 use crate::Error;
-use crate::data::{Channel, Padding, Recording, Source, Times, check};
+use crate::data::{Channel, Finding, Padding, Recording, Source, Times, check};
 use channel::ChannelTotals;
 use clock::Steps;
 use dynamics::Dynamics;
@@ -42,7 +42,7 @@ const SAME_STEP: f64 = 0.01;
 /// - left out: whether a step test begins at rest, delays where there are more than seven inputs or the sums lack the digits, and
 ///   excitation, delays and feedback where the clock is irregular or goes back: the log is not resampled.
 ///
-/// The warnings of the document name what is left out, and what is of the first rows. Gaps are told by the median step of the first part; where
+/// The findings of the document name what is left out, and what is of the first rows. Gaps are told by the median step of the first part; where
 /// the whole log has another one, what depends on it is left out.
 ///
 /// Cost: O(N (log L + q^2 L)) for N rows, q inputs and outputs and L = 112; the memory of a part, 4 MB for each channel (0.3 MB of more
@@ -245,16 +245,15 @@ impl Totals {
     }
 
     fn finish(mut self, source: &Source, plan: &InspectionPlan) -> Result<Inspection, Error> {
-        let mut words = Vec::new();
+        let mut left_out = Vec::new();
         let (ticks, first_median) = match &mut self.clock {
             Clocked::Uniform(step) => (Ticks::new(&Times::Uniform(*step), self.rows)?, *step),
             Clocked::Measured { steps, median } => {
                 let (ticks, exact) = steps.finish()?;
                 if !exact {
-                    words.push(
-                        "the clock has more different steps than are kept: its sample time is the median to three digits"
-                            .to_owned(),
-                    );
+                    left_out.push(Finding::left_out(
+                        "the clock has more different steps than are kept: its sample time is the median to three digits",
+                    ));
                 }
                 (ticks, *median)
             }
@@ -270,28 +269,28 @@ impl Totals {
             if role(name).is_some() {
                 last = last.min(totals.tail());
             }
-            let (own, left_out) = totals.finish(name, role(name));
+            let (own, not_said) = totals.finish(name, role(name));
             quality.push(own);
-            words.extend(left_out);
+            left_out.extend(not_said);
         }
         let mut inspection = run::described(quality, self.rows, &ticks, source, plan)?;
-        inspection.warnings.extend(words);
+        inspection.findings.extend(left_out);
         match self.dynamics {
-            Err(why) => inspection.warnings.push(why),
-            Ok(_) if ticks.clock.irregular => inspection.warnings.push(run::IRREGULAR.to_owned()),
+            Err(why) => inspection.findings.push(Finding::left_out(why)),
+            Ok(_) if ticks.clock.irregular => inspection.findings.push(Finding::left_out(run::IRREGULAR)),
             Ok(_) if (first_median / ticks.clock.sample_time - 1.0).abs() > SAME_STEP => {
-                inspection.warnings.push(
-                    "excitation, delay and feedback are left out, as the clock is another one at the beginning of the log"
-                        .to_owned(),
-                );
+                inspection.findings.push(Finding::left_out(
+                    "excitation, delay and feedback are left out, as the clock is another one at the beginning of the log",
+                ));
             }
             Ok(dynamics) => {
-                inspection.warnings.extend(Padding::of(self.rows, last)?.map(|padding| padding.to_string()));
+                let padding = Padding::of(self.rows, last)?;
+                inspection.findings.extend(padding.map(|padding| findings::of_padding(&padding)));
                 dynamics.finish(&mut inspection, plan)?;
             }
         }
-        let words = warnings::of_the_dynamics(&inspection, plan);
-        inspection.warnings.extend(words);
+        let of_the_dynamics = findings::of_the_dynamics(&inspection, plan);
+        inspection.findings.extend(of_the_dynamics);
         Ok(inspection)
     }
 }

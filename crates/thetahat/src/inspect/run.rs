@@ -5,9 +5,10 @@ use rayon::prelude::*;
 use super::clock::Ticks;
 use super::inspection::{ChannelQuality, Feedback, Inspection};
 use super::plan::InspectionPlan;
-use super::{channel, delay, excitation, moments, rest, warnings};
+use super::{channel, delay, excitation, findings, moments, rest};
 use crate::data::{
-    Channel, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times, check,
+    Channel, Finding, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times,
+    check,
 };
 use crate::validate::feedback::feedback;
 use crate::{Document, Error};
@@ -24,7 +25,7 @@ pub(super) const IRREGULAR: &str = "excitation, delay and feedback are left out,
 ///
 /// Clock and quality are those of the rows as they are. Excitation, delay and feedback are of the log as a fit would see
 /// it: resampled where its clock is irregular, and cut where a value is missing. What cannot be said is left out, and
-/// the warnings say why; [`Inspection::command`] is left to whoever knows the command line.
+/// the findings say why; [`Inspection::command`] is left to whoever knows the command line.
 ///
 /// Cost: O(N log N) for each channel, about a second for 10^6 rows of three channels.
 ///
@@ -60,10 +61,10 @@ pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> 
             inspection.log.resampled = resampled;
             dynamics(&mut inspection, &log, plan)?;
         }
-        Err(why) => inspection.warnings.push(why),
+        Err(why) => inspection.findings.push(Finding::left_out(why)),
     }
-    let words = warnings::of_the_dynamics(&inspection, plan);
-    inspection.warnings.extend(words);
+    let of_the_dynamics = findings::of_the_dynamics(&inspection, plan);
+    inspection.findings.extend(of_the_dynamics);
     Ok(inspection)
 }
 
@@ -107,8 +108,8 @@ pub fn inspect_log(log: &Log, source: &Source, plan: &InspectionPlan) -> Result<
     let mut inspection = of_the_rows(log.channels(), &times, &ticks, &roles, source, plan)?;
     inspection.experiments = log.boundaries().len() + 1;
     dynamics(&mut inspection, log, plan)?;
-    let words = warnings::of_the_dynamics(&inspection, plan);
-    inspection.warnings.extend(words);
+    let of_the_dynamics = findings::of_the_dynamics(&inspection, plan);
+    inspection.findings.extend(of_the_dynamics);
     Ok(inspection)
 }
 
@@ -162,9 +163,9 @@ pub(super) fn described(
         feedback: Vec::new(),
         rest: None,
         command: None,
-        warnings: Vec::new(),
+        findings: Vec::new(),
     };
-    inspection.warnings = warnings::of_the_rows(&inspection, ticks, plan);
+    inspection.findings = findings::of_the_rows(&inspection, ticks, plan);
     Ok(inspection)
 }
 
@@ -224,7 +225,7 @@ fn uniform(
 fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Result<(), Error> {
     let all = [Rows::new(1, log.rows())?];
     let names: Vec<&str> = plan.inputs.iter().chain(&plan.output).map(String::as_str).collect();
-    inspection.warnings.extend(log.padding(&names)?.map(|padding| padding.to_string()));
+    inspection.findings.extend(log.padding(&names)?.map(|padding| findings::of_padding(&padding)));
     let values = |name: &str| Ok(log.channel(name)?.values.as_slice());
     let inputs: Vec<&[f64]> = plan.inputs.iter().map(|name| values(name)).collect::<Result<_, Error>>()?;
     let of_input = |(name, input): (&String, &&[f64])| {
@@ -254,22 +255,17 @@ fn dynamics(inspection: &mut Inspection, log: &Log, plan: &InspectionPlan) -> Re
         signal.fill(0.0);
     }
     if let Some((output, inputs)) = signals.split_last() {
-        delay::estimate(&mut inspection.delays, inputs, output, &segments)?;
+        let found = feedback(inputs, output, &segments);
+        delay::estimate(&mut inspection.delays, inputs, output, &segments, &found.certain())?;
         let unit = |values: &[f64], own: &[f64]| moments::unit(values, own, &segments);
         let of_output = unit(measured, output);
         for ((delay, values), own) in inspection.delays.iter_mut().zip(&raw).zip(inputs) {
             delay.scale(of_output.zip(unit(values, own)).map_or(f64::NAN, |(output, input)| output / input));
         }
-        let found = feedback(inputs, output, &segments);
         let unstable = found.unstable();
         let verdicts = plan.inputs.iter().zip(found.inputs);
         inspection.feedback = verdicts.map(|(input, found)| Feedback::new(input, found)).collect();
-        inspection.warnings.extend(unstable.map(|words| {
-            format!(
-                "{words}; fit a model with noise that may be unstable (arx, armax), as oe and `method` iv or sriv are biased in a \
-                 closed loop"
-            )
-        }));
+        inspection.findings.extend(unstable.map(findings::of_unstable));
     }
     inspection.doubt_steps();
     inspection.share_delays();

@@ -1,6 +1,7 @@
 //! Runs at the largest or the smallest value.
 
-use super::Saturation;
+use super::{Saturation, named::NAMED};
+use crate::data::Rows;
 
 /// A limit must have this many rows in runs, for each row of the most frequent value near it.
 const CROWDED: usize = 5;
@@ -14,12 +15,19 @@ const FEWEST: usize = 5;
 pub(super) struct Run {
     pub(super) value: f64,
     pub(super) rows: usize,
+    /// The position of the first of them.
+    pub(super) start: usize,
 }
 
 /// The runs of equal values, those of missing ones left out. A missing value ends a run.
 pub(super) fn runs(values: &[f64]) -> impl Iterator<Item = Run> {
-    let runs = values.chunk_by(|left, right| left == right).filter(|run| !run[0].is_nan());
-    runs.map(|run| Run { value: run[0], rows: run.len() })
+    let mut next = 0;
+    let runs = values.chunk_by(|left, right| left == right).map(move |run| {
+        let start = next;
+        next += run.len();
+        Run { value: run[0], rows: run.len(), start }
+    });
+    runs.filter(|run| !run.value.is_nan())
 }
 
 /// Rows in runs of two and more at the limits, where a limit is crowded.
@@ -37,15 +45,19 @@ pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {
     levels().nth(NEAR + 1)?;
     let count = runs(values).count();
     let most = |near: &mut dyn Iterator<Item = &[f64]>| near.map(<[f64]>::len).max().unwrap_or(0);
-    let rows = |limit: f64, most: usize| {
+    let at = |limit: f64| {
         // Without the first and the last.
         let inner = runs(values).take(count.saturating_sub(1)).skip(1);
-        crowded(inner.filter(|run| run.value == limit && run.rows > 1).map(|run| run.rows).sum(), most)
+        inner.filter(move |run| run.value == limit && run.rows > 1)
     };
-    let (lowest, highest) = (sorted.first()?, sorted.last()?);
-    let low = rows(*lowest, most(&mut levels().skip(1).take(NEAR)));
-    let high = rows(*highest, most(&mut levels().rev().skip(1).take(NEAR)));
-    (low + high > 0).then_some(Saturation { low, high })
+    let rows = |limit: f64, most: usize| crowded(at(limit).map(|run| run.rows).sum(), most);
+    let (lowest, highest) = (*sorted.first()?, *sorted.last()?);
+    let low = rows(lowest, most(&mut levels().skip(1).take(NEAR)));
+    let high = rows(highest, most(&mut levels().rev().skip(1).take(NEAR)));
+    let named = |limit: f64| {
+        at(limit).take(NAMED).map(|run| Rows::from_positions(&(run.start..run.start + run.rows)))
+    };
+    Saturation::of(low, high, || named(lowest).collect(), || named(highest).collect())
 }
 
 /// The rows at a limit, if they are more than chance: `most` are those of the most frequent value near it.

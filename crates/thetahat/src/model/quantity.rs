@@ -57,6 +57,9 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// The whole line: the data do not determine the figure.
+    pub const OPEN: Self = Self { lower: None, upper: None };
+
     /// In words, the ends written by a function: `1.2 to 3.4`, `1.2 and more`, `3.4 and less`, `anything`.
     ///
     /// ```

@@ -257,6 +257,7 @@ fn fit(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions: Vec::new(),
         model: Model::Equations(fitted.clone()),
         estimation,
         fit: Vec::new(),

@@ -34,6 +34,7 @@ pub(super) fn report_of(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions: Vec::new(),
         estimation: estimation_of(fitted, taken),
         fit: Vec::new(),
         warnings: Vec::new(),

@@ -17,7 +17,7 @@ mod text;
 mod tuning;
 
 pub use charts::Transient;
-use charts::{Marked, Shade, Stack};
+use charts::{Shade, Stack};
 use outputs::{compared_outputs, outputs, points};
 use page::{Block, Page, Section};
 pub use response::response_page;
@@ -26,7 +26,7 @@ pub use tuning::tuning_page;
 
 use super::{Report, Validated, Validation};
 use crate::Error;
-use crate::data::{Rows, Source};
+use crate::data::{Finding, FindingKind, Rows, Source};
 use crate::estimate::Procedure;
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
@@ -65,6 +65,9 @@ pub fn fit_page(
     page.sections.extend(of_model(report));
     if let Some(selection) = &report.selection {
         let mut section = Section::new("Order search");
+        for decision in &report.decisions {
+            section.text(decision.to_string());
+        }
         for step in &selection.steps {
             section.text(step);
         }
@@ -227,14 +230,15 @@ pub fn inspection_page(
         figures::short(inspection.clock.sample_time)
     )];
     let brief = inspection.brief(CHANNELS);
-    page.warnings = &brief.warnings;
+    let warnings = brief.warnings();
+    page.warnings = &warnings;
 
     let mut section = Section::new("Channels");
     let left_out = inspection.channels.len() - brief.channels.len();
     if left_out > 0 {
         section.text(format!(
             "The channels that matter most; the JSON document has {left_out} more, and {} warnings in all.",
-            inspection.warnings.len()
+            inspection.findings.len()
         ));
     }
     let inspection = &brief;
@@ -244,24 +248,20 @@ pub fn inspection_page(
     let step = if inspection.clock.irregular { f64::INFINITY } else { inspection.clock.sample_time };
     let dated = || Stack::new(time, step, points(signals.len())).dated(std::slice::from_ref(&inspection.log));
     let mut stack = dated();
-    let mut first = true;
-    let circles = if inspection.channels.iter().any(|channel| !channel.outliers.is_empty()) {
-        " Circles: values far from their neighbours, the first of each channel."
-    } else {
-        ""
-    };
+    let mut named: Vec<&str> = Vec::new();
+    let marked = inspection.findings.iter().any(|finding| place(finding).is_some());
+    let circles = if marked { " Circles: where findings are, the first of each channel." } else { "" };
     let words = &format!("One time axis: zooming one zooms all.{circles}");
     for (position, (name, values)) in signals.iter().enumerate() {
         if stack.is_full() {
             section.chart(std::mem::replace(&mut stack, dated()).draw("Channels over time", words, &[]));
-            first = true;
+            named.clear();
         }
         stack.alone(name, values, position);
-        if let Some(channel) = shown(name)
-            && !channel.outliers.is_empty()
-        {
-            stack.marks(&Marked { name: "outliers", rows: &channel.outliers }, values, first);
-            first = false;
+        for finding in inspection.findings.iter().filter(|finding| finding.channels.contains(name)) {
+            let Some(what) = place(finding) else { continue };
+            stack.marks(what, &finding.rows, values, !named.contains(&what));
+            named.push(what);
         }
     }
     if !stack.is_empty() {
@@ -297,6 +297,16 @@ pub fn inspection_page(
     section.table(tables::logs(std::slice::from_ref(&inspection.log)));
     page.sections.push(section);
     page.write()
+}
+
+/// What a picture of a channel calls a finding that it can show.
+fn place(finding: &Finding) -> Option<&'static str> {
+    match finding.kind {
+        FindingKind::Outliers => Some("outliers"),
+        FindingKind::Stuck => Some("stuck"),
+        FindingKind::Saturation => Some("at its limit"),
+        _ => None,
+    }
 }
 
 /// The files of a title.

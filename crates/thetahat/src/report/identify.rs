@@ -1,6 +1,9 @@
 mod in_states;
+mod integrating;
+mod nonlinear;
 mod step_test;
 
+use std::borrow::Cow;
 use std::ops::{ControlFlow, Range};
 
 use rayon::prelude::*;
@@ -13,13 +16,16 @@ use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
 use super::warnings::warnings;
-use crate::data::{Detrend, Log, Offset, Prefiltered, Record, Rows, Source, digests};
+use crate::data::{Decision, Detrend, FindingKind, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
-use crate::model::{Orders, ProcessStructure, Quantity, Signal};
+use crate::inspect::is_few_sinusoids;
+use crate::model::{Interval, Orders, ProcessStructure, Quantity, Signal};
 use crate::respond::{Horizon, InitialCondition, innovations};
-use crate::select::{self, Choice, Focus, SelectedModel, Task};
+use crate::select::{self, Automatic, Choice, Focus, SelectedModel, Task};
 use crate::{Document, Error};
 use in_states::InStates;
+use integrating::Integrating;
+use nonlinear::Nonlinear;
 use step_test::StepTest;
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
@@ -118,9 +124,10 @@ fn fit(
         estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
         validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
     };
-    let rivals = Rivals {
-        step_test: StepTest::of(&log, plan, compared.estimation)?,
-        in_states: InStates::of(&log, plan),
+    let raw = matches!(plan.choice, Choice::Automatic(_)).then(|| log.clone());
+    let rivals = match &raw {
+        Some(raw) => Rivals::of(raw, plan, compared.estimation)?,
+        None => Rivals::default(),
     };
     let padding = log.padding(&names)?;
     // What an input has done while the output was missing is in the output after it.
@@ -142,18 +149,24 @@ fn fit(
         None => log.record(&plan.inputs, &plan.output, rows),
     };
     let mut method = plan.method.clone();
+    let mut decisions = Vec::new();
     let (mut selection, mut orders, guess) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
-            let Chosen { found, with_constant, process, order } =
-                selected(&record, plan, &compared, &beside, &rivals, monitor)?;
-            let SelectedModel { selection, mut guess } = found;
+            let Chosen { found, with_constant, process, order, nonlinear } =
+                selected(&record, plan, &compared, &beside, &rivals, (sources, monitor))?;
+            let SelectedModel { selection, decisions: found, mut guess } = found;
+            decisions = found;
             if let Some((structure, test)) = process.zip(rivals.step_test) {
-                let report = test.fit(structure, selection, sources, monitor)?;
+                let report = test.fit(structure, selection, decisions, (sources, monitor))?;
+                return Ok((PendingEvaluation::done(report), log));
+            }
+            if let Some(report) = nonlinear {
+                let report = Report { selection: Some(selection), decisions, ..report };
                 return Ok((PendingEvaluation::done(report), log));
             }
             if let Some((order, in_states)) = order.zip(rivals.in_states) {
-                let report = in_states.fit(order, selection, sources, monitor)?;
+                let report = in_states.fit(order, selection, decisions, (sources, monitor))?;
                 return Ok((PendingEvaluation::done(report), log));
             }
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
@@ -227,6 +240,14 @@ fn fit(
     let Fitted { estimate, offset, open, .. } = &fitted;
     let mut model = estimate.to_model(&orders, log.sample_time(), inputs.to_vec(), output.clone())?;
     model.offset_covariance.clone_from(open);
+    let record = log.record(&plan.inputs, &plan.output, &estimation)?;
+    let sinusoids: Vec<bool> =
+        record.inputs.iter().map(|input| is_few_sinusoids(input, &record.segments)).collect();
+    for (gain, _) in model.dc_gain.iter_mut().zip(&sinusoids).filter(|(_, few)| **few) {
+        if let Some(gain) = gain {
+            (gain.standard_error, gain.interval) = (None, Some(Interval::OPEN));
+        }
+    }
     let taken = [output.offset, offset.map_or_else(Offset::default, |found| found.offset)];
     if let Some(found) = offset {
         log.remove(&output.name, &found.offset);
@@ -234,6 +255,16 @@ fn fit(
             level: output.offset.level + found.offset.level,
             slope: output.offset.slope + found.offset.slope,
         };
+    }
+
+    let closed = decisions.iter().any(|decision| decision.kind == FindingKind::Feedback);
+    if let Some(rival) = rivals.integrating.filter(|_| !closed) {
+        let record = log.record(&plan.inputs, &plan.output, &estimation)?;
+        if let Some((report, decision)) = rival.instead(&model, &record, (sources, monitor))? {
+            decisions.push(decision);
+            let decisions = [decisions, report.decisions].concat();
+            return Ok((PendingEvaluation::done(Report { selection, decisions, ..report }), log));
+        }
     }
 
     let mut report = Report {
@@ -254,6 +285,7 @@ fn fit(
             time_gaps: log.gaps(),
         },
         selection,
+        decisions,
         estimation: estimation_of(&fitted, output.offset),
         fit: Vec::new(),
         warnings: Vec::new(),
@@ -315,18 +347,37 @@ struct Compared<'a> {
 }
 
 /// Models of other kinds that compete with polynomials, each where it may.
-struct Rivals {
-    step_test: Option<StepTest>,
-    in_states: Option<InStates>,
+#[derive(Default)]
+struct Rivals<'l> {
+    step_test: Option<StepTest<'l>>,
+    in_states: Option<InStates<'l>>,
+    nonlinear: Option<Nonlinear<'l>>,
+    integrating: Option<Integrating<'l>>,
 }
 
-/// A choice, whether all models had a constant, and the process or the order of the model in state space that is taken instead, if one
-/// is.
+impl<'l> Rivals<'l> {
+    /// Those of a log as it was read.
+    ///
+    /// # Errors
+    /// [`Error::Data`] for channels that are not there.
+    fn of(log: &'l Log, plan: &Plan, rows: &[Rows]) -> Result<Self, Error> {
+        Ok(Self {
+            step_test: StepTest::of(log, plan, rows)?,
+            in_states: InStates::of(log, plan),
+            nonlinear: Nonlinear::of(log, plan),
+            integrating: Integrating::of(log, plan),
+        })
+    }
+}
+
+/// A choice, whether all models had a constant, and the process, the order of the model in state space or the report of the nonlinear
+/// one that is taken instead, if one is.
 struct Chosen {
     found: SelectedModel,
     with_constant: bool,
     process: Option<ProcessStructure>,
     order: Option<usize>,
+    nonlinear: Option<Report>,
 }
 
 /// The choice among several models. Where a constant is asked for or pays, all of them have one.
@@ -335,8 +386,8 @@ fn selected<'a>(
     plan: &Plan,
     compared: &Compared<'_>,
     beside: &Beside,
-    rivals: &Rivals,
-    monitor: Monitor<'_>,
+    rivals: &Rivals<'_>,
+    (sources, monitor): (&[Source], Monitor<'_>),
 ) -> Result<Chosen, Error> {
     let Method::PredictionError(search) = &plan.method else {
         return Err(Error::argument(
@@ -357,18 +408,20 @@ fn selected<'a>(
     };
     let signals = if with_constant { beside.signals() } else { Vec::new() };
     let held_out = held_out.map(|held_out| held_out.with_inputs(&signals));
+    let (choice, decision) = without_delays(&plan.choice, &estimation, &plan.inputs);
     let task = Task {
         estimation: &estimation.with_inputs(&signals),
         validation: held_out.as_ref(),
         inputs: &plan.inputs,
         select: plan.select,
-        focus: plan.focus,
+        focus: if decision.is_some() && plan.focus == Focus::Auto { Focus::Prediction } else { plan.focus },
         initial: plan.initial,
         search,
         deadline: Deadline::after(search.time_limit),
         monitor,
     };
-    let mut found = select::choose(&task, &plan.choice)?;
+    let mut found = select::choose(&task, &choice)?;
+    found.decisions.extend(decision);
     if with_constant {
         let what = if plan.trend { "a constant and a trend" } else { "a constant" };
         found.selection.steps.push(format!("All models were compared with {what} beside them."));
@@ -381,7 +434,37 @@ fn selected<'a>(
         Some(_) if process.is_none() => select::states(&task, found, plan.constant())?,
         _ => (found, None),
     };
-    Ok(Chosen { found, with_constant, process, order })
+    let (found, nonlinear) = match &rivals.nonlinear {
+        Some(rival) if process.is_none() && order.is_none() => rival.compete(&task, found, sources)?,
+        _ => (found, None),
+    };
+    Ok(Chosen { found, with_constant, process, order, nonlinear })
+}
+
+/// The choice without a search for delays where all inputs are sums of few sinusoids, which do not tell one delay from another; and what is to
+/// be said of that.
+fn without_delays<'c>(
+    choice: &'c Choice,
+    record: &Record<'_>,
+    inputs: &[String],
+) -> (Cow<'c, Choice>, Option<Decision>) {
+    let Choice::Automatic(automatic @ Automatic { nk: None, .. }) = choice else {
+        return (Cow::Borrowed(choice), None);
+    };
+    if inputs.is_empty() || !record.inputs.iter().all(|input| is_few_sinusoids(input, &record.segments)) {
+        return (Cow::Borrowed(choice), None);
+    }
+    let plural = if inputs.len() == 1 { " '" } else { "s '" };
+    let are = if inputs.len() == 1 { "is a sum" } else { "are sums" };
+    let decision = Decision {
+        kind: FindingKind::FewSinusoids,
+        channels: inputs.to_vec(),
+        because: format!("input{plural}{}' {are} of a few sinusoids", inputs.join("', '")),
+        did: "no delay is searched, no gain at rest is given, and errors one step ahead decide, as the log shows no more".to_owned(),
+        instead: "`nk` or `focus`".to_owned(),
+    };
+    let nk = Some(vec![1; inputs.len()]);
+    (Cow::Owned(Choice::Automatic(Automatic { nk, ..automatic.clone() })), Some(decision))
 }
 
 /// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.

@@ -1,12 +1,11 @@
 //! Fits of nonlinear ARX models.
 
-mod auto;
 mod map;
 mod plan;
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use thetahat_numerics::optimize::{Monitor, Stopped};
 
@@ -27,84 +26,14 @@ use crate::select::Focus;
 use crate::validate::Part;
 use crate::{Document, Error};
 
-use self::auto::best;
 use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 
 /// Below this fraction of a channel's size, what an offset leaves is rounding.
 pub(super) const ROUNDING: f64 = 1e-13;
 
-/// Fits a nonlinear ARX model,
-///
-/// ```text
-/// y(t) = sum_j theta_j f_j(z(t)) + e(t)
-/// ```
-///
-/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map.
-/// Of functions that are known forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
-/// 1989). Products are chosen from moments, without a matrix of all of them, and the parameters come from a QR of the chosen ones; their
-/// covariance is that of a linear regression with white noise. How many are taken is what the free run says of rows that they were not
-/// fitted to, an information criterion, or given. Functions with numbers of their own, such as the weights of a network, are trained: a
-/// search from several starts for the least errors of free runs, or of shorter ones.
-///
-/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions; of a training
-/// O(N (p^2 + na p)) for each iteration on p numbers.
-///
-/// # Errors
-/// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are not there, an
-/// irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is constant, or
-/// functions depend on one another.
-///
-/// ```
-/// use thetahat::data::{Channel, Detrend, Log};
-/// use thetahat::report::{NonlinearArxPlan, fit_nonlinear_arx};
-///
-/// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
-/// let (mut u, mut y, mut random) = (Vec::new(), vec![0.0], 1_u32);
-/// for t in 0..200 {
-///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-///     u.push(f64::from(random >> 16) / 32_768.0 - 1.0);
-///     y.push(0.5 * y[t] + u[t] * u[t]);
-/// }
-/// y.pop();
-/// let channel = |name: &str, values| Channel { name: name.into(), values };
-/// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
-/// let plan = NonlinearArxPlan {
-///     terms: Some(2),
-///     raw_terms: true,
-///     detrend: Detrend::None,
-///     ..NonlinearArxPlan::new(&["u"], &["y"])
-/// };
-/// let report = fit_nonlinear_arx(&log, &[], &plan)?;
-/// let [first, second] = report.model.parameters() else { panic!("two terms") };
-/// assert_eq!((first.name.as_str(), second.name.as_str()), ("u(k-1)^2", "y(k-1)"));
-/// assert!((first.value - 1.0).abs() < 1e-12 && (second.value - 0.5).abs() < 1e-12);
-/// # Ok::<(), thetahat::Error>(())
-/// ```
-pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
-    fit_nonlinear_arx_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
-}
-
-/// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may end it.
-///
-/// # Errors
-/// As for [`fit_nonlinear_arx`]; [`Error::Interrupted`] if the monitor says so.
-pub fn fit_nonlinear_arx_monitored(
-    log: &Log,
-    sources: &[Source],
-    plan: &NonlinearArxPlan,
-    monitor: Monitor<'_>,
-) -> Result<Report, Error> {
-    plan.check()?;
-    let plan = &plan.holding_out()?;
-    match plan.map {
-        MapPlan::Auto => best(log, sources, plan, monitor),
-        _ => fit_planned(log, sources, plan, monitor),
-    }
-}
-
 /// The fit of a plan that was checked, of one kind of map.
-fn fit_planned(
+pub(super) fn fit_planned(
     log: &Log,
     sources: &[Source],
     plan: &NonlinearArxPlan,
@@ -184,6 +113,7 @@ pub(super) fn reported(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions: Vec::new(),
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),

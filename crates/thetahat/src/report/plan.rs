@@ -1,3 +1,5 @@
+use thetahat_numerics::optimize::Search;
+
 use crate::Error;
 use crate::data::{Detrend, Prefilter, Rows, Split};
 use crate::estimate::{Constant, Initial, Method};
@@ -88,6 +90,31 @@ impl Plan {
             && free_run
             && selection.chosen.structure == Structure::Oe
             && matches!(&self.choice, Choice::Automatic(Automatic { structure: None, .. }))
+    }
+
+    /// Whether nothing is asked of the model, so that another kind than polynomials may be taken.
+    pub(super) fn leaves_all_open(&self) -> bool {
+        matches!(&self.choice, Choice::Automatic(Automatic { structure: None, nk: None, .. }))
+            && matches!(self.method, Method::PredictionError(_))
+            && self.select == Select::MDL
+            && self.focus == Focus::Auto
+            && self.initial == Initial::Auto
+            && self.prefilter.is_none()
+            && !self.trend
+            && !self.inputs.is_empty()
+    }
+
+    /// The search for the least squares; none of other methods.
+    pub(super) fn search(&self) -> Option<&Search> {
+        match &self.method {
+            Method::PredictionError(search) => Some(search),
+            _ => None,
+        }
+    }
+
+    /// Whether nonlinear models are left out.
+    pub(super) fn is_linear(&self) -> bool {
+        !matches!(&self.choice, Choice::Automatic(Automatic { linear: false, .. }))
     }
 
     /// Refuses a focus that does not go with orders or method.

@@ -12,7 +12,7 @@ use thetahat_numerics::optimize::{Monitor, Search};
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
-use crate::data::{Log, Offset, Rows, Source, Split};
+use crate::data::{Decision, FindingKind, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Background, Criteria, Initial, Procedure, ProcessEstimate, least_free_run};
 use crate::model::{Model, OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
 use crate::respond::process::{ProcessOnLog, held_logs};
@@ -39,8 +39,9 @@ pub struct ProcessPlan {
     pub offsets: Vec<(String, f64)>,
     /// Whether the output has a slope of its own, in its units per second.
     pub trend: bool,
-    /// Whether each log begins in a state that is estimated; else at rest.
-    pub free_start: bool,
+    /// Whether each log begins in a state that is estimated, or at rest. None: at rest, unless a state explains more than a tenth of the
+    /// squared errors.
+    pub free_start: Option<bool>,
     /// How to search; `starts` are further points of the grid, `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
 }
@@ -57,7 +58,7 @@ impl ProcessPlan {
             split: None,
             offsets: Vec::new(),
             trend: false,
-            free_start: false,
+            free_start: None,
             search: Search::default(),
         }
     }
@@ -141,7 +142,8 @@ impl ProcessPlan {
 /// is left out.
 ///
 /// **Start.** The process is at rest in the first row of each log, with the inputs of that row, which are the offsets u_j0 unless others
-/// are given. With `free_start` each log has a state of its own; beside a single step that is nearly the same as the step. The output of an
+/// are given. With `free_start`, and where nothing was said and a state explains more than a tenth of the squared errors, each log has a state
+/// of its own; beside a single step that is nearly the same as the step. The output of an
 /// integrator then has a slope too, since an input that is not at rest moves it at a rate of its own, unless the offset of the input is given.
 ///
 /// **Standard errors** are for errors of any colour, that of an autoregression of the residuals. Those for white errors, which are
@@ -215,13 +217,37 @@ pub fn fit_process(
         .iter()
         .zip(&plan.inputs)
         .any(|(structure, input)| structure.integrates() && plan.offset_of(input).is_none());
-    let slope = plan.trend || plan.free_start && given.is_none() && open_rate;
-    let background = Background { level: given.is_none(), slope, free: plan.free_start };
     let parameters = ProcessModel::names(&structures, &plan.inputs);
     let measured = &deviations.channel(&plan.output)?.values;
-    let found =
-        least_free_run(&structures, &parameters, (&held, measured), background, &plan.search, monitor)?;
-    let model = model(plan, log.sample_time(), inputs, structures, &parameters, &found)?;
+    let fit = |free: bool| {
+        let slope = plan.trend || free && given.is_none() && open_rate;
+        let background = Background { level: given.is_none(), slope, free };
+        let found =
+            least_free_run(&structures, &parameters, (&held, measured), background, &plan.search, monitor)?;
+        Ok::<_, Error>((background, found))
+    };
+    let mut decisions = Vec::new();
+    let (mut background, mut found) = fit(plan.free_start.unwrap_or(false))?;
+    // With a state of its own an integrator has a slope too, which columns of states do not show.
+    let free = match plan.free_start {
+        None if open_rate && given.is_none() => Some(fit(true)?),
+        None if warnings::begins_in_motion(found.explained_by_starts) => Some(fit(true)?),
+        _ => None,
+    };
+    if let Some((free, own)) = free
+        && warnings::begins_in_motion(found.explained_by_starts.max(1.0 - own.mse / found.mse))
+    {
+        let explained = 100.0 * found.explained_by_starts.max(1.0 - own.mse / found.mse);
+        decisions.push(Decision {
+            kind: FindingKind::InMotion,
+            channels: Vec::new(),
+            because: format!("the log does not begin at rest with its first inputs, by {explained:.0} % of the squared errors"),
+            did: "the state in which it begins is estimated".to_owned(),
+            instead: "`initial` zero".to_owned(),
+        });
+        (background, found) = (free, own);
+    }
+    let model = model(plan, log.sample_time(), inputs, structures, &parameters, (background.free, &found))?;
     let starts = found.explained_by_starts;
 
     let segments = held.iter().flat_map(|part| &part.counted).map(Rows::from_positions);
@@ -229,7 +255,7 @@ pub fn fit_process(
     let error = |place: usize| found.covariance.as_ref().map(|rows| rows[place][place].sqrt());
     let count = parameters.len();
     let estimation = Estimation {
-        initial: Some(if plan.free_start { Initial::Estimate } else { Initial::Zero }),
+        initial: Some(if background.free { Initial::Estimate } else { Initial::Zero }),
         level: found.run.level.map(|level| Quantity::new(level, error(count))),
         slope: found.run.slope.map(|slope| Quantity::new(slope, error(count + 1))),
         samples: found.samples,
@@ -243,11 +269,17 @@ pub fn fit_process(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions,
         warnings: warnings::of_fit(&model, &held, &estimation, starts),
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
     };
+    if log.check_uniform().is_ok()
+        && let Ok(record) = deviations.record(&plan.inputs, &plan.output, &report.data.estimation)
+    {
+        report.warnings.extend(warnings::of_feedback(&plan.inputs, &record));
+    }
     let signals = || model.inputs.iter().chain([&model.output]);
     let own = log.deviations(signals().map(|signal| (signal.name.as_str(), signal.offset)))?;
     let on_log = |rows: &[Rows]| ProcessOnLog::new(&model, &own, rows);
@@ -266,7 +298,7 @@ fn model(
     inputs: Vec<Signal>,
     structures: Vec<ProcessStructure>,
     names: &[String],
-    found: &ProcessEstimate,
+    (free_start, found): (bool, &ProcessEstimate),
 ) -> Result<ProcessModel, Error> {
     let count = names.len();
     let covariance = found.covariance.as_ref();
@@ -299,7 +331,7 @@ fn model(
         }),
         noise_variance: found.noise_variance,
         degrees_of_freedom: Some(found.samples - found.unknowns),
-        free_start: plan.free_start,
+        free_start,
     };
     model.check()?;
     Ok(model)

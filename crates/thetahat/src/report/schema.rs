@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::data::{Prefilter, Rows, Source};
+use crate::data::{Decision, Prefilter, Rows, Source};
 use crate::document::document_methods;
 use crate::estimate::{Criteria, Initial, Procedure};
 use crate::model::{Model, Quantity};
@@ -25,6 +25,9 @@ pub struct Report {
     /// How the model was chosen among others, if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub selection: Option<Selection>,
+    /// What the fit did by itself because of what it found in the log.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub decisions: Vec<Decision>,
     /// The model.
     pub model: Model,
     /// How it was estimated.

@@ -360,6 +360,7 @@ pub(super) fn reported(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions: Vec::new(),
         warnings: warnings::of_fit(&model, &estimation, &offered),
         model: Model::from(model.clone()),
         estimation,

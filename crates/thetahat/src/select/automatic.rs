@@ -4,16 +4,18 @@
 
 use std::collections::BTreeSet;
 
-use super::candidates::{MOST_INPUTS, are_enough};
-use super::compare::compare;
+use super::candidates::{MOST_INPUTS, Samples, are_enough, energy, rows, total};
+use super::compare::{LONG, SEGMENT, SEGMENTS, compare};
 use super::delay;
 use super::grid::key;
+use super::linear::{Columns, Fitted, Scaled};
 use super::ranking::ranked;
-use super::{Automatic, SelectedModel, Selection, Task};
+use super::{Automatic, EXACT, Focus, SelectedModel, Selection, Task};
 use crate::Error;
-use crate::data::Record;
-use crate::estimate::{Initial, pays};
+use crate::data::{Decision, FindingKind, Record};
+use crate::estimate::{Initial, pays, stretches};
 use crate::model::{Orders, Structure};
+use crate::validate::feedback::feedback;
 
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
@@ -56,9 +58,13 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
             ),
         ));
     }
-    let structures = structures(task, automatic)?;
+    let follows = followers(task);
+    let closed = automatic.structure.is_none() && task.focus == Focus::Auto && follows.contains(&true);
+    let task = &if closed { Task { focus: Focus::Prediction, ..*task } } else { *task };
+    let structures = structures(task, automatic, closed)?;
     let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));
     let mut steps = Vec::new();
+    let decisions = if closed { vec![in_closed_loop(task, &follows)] } else { Vec::new() };
     let (delays, nk) = match &automatic.nk {
         Some(nk) if nk.len() == inputs => (Vec::new(), nk.clone()),
         Some(nk) => {
@@ -67,7 +73,7 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
                 format!("there are {} values for {inputs} inputs; give one for each", nk.len()),
             ));
         }
-        None if driven => delay::found(task, &mut steps)?,
+        None if driven => delay::found(task, &follows, &mut steps)?,
         None => (Vec::new(), vec![1; inputs]),
     };
     let mut models = candidates(task.estimation, &structures, &nk)?;
@@ -90,10 +96,41 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
     let outcome = compare(task, models)?;
-    let SelectedModel { mut selection, guess } = ranked(task, outcome, None)?;
+    let SelectedModel { mut selection, guess, .. } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
-    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, guess })
+    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, guess })
+}
+
+/// Which inputs follow the output beyond doubt.
+fn followers(task: &Task<'_>) -> Vec<bool> {
+    let few = stretches(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
+    let record = few.as_ref().unwrap_or(task.estimation);
+    feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments).certain()
+}
+
+/// What feedback means for the choice.
+fn in_closed_loop(task: &Task<'_>, follows: &[bool]) -> Decision {
+    let names =
+        task.inputs.iter().zip(follows).filter(|(_, follows)| **follows).map(|(name, _)| name.clone());
+    let channels: Vec<String> = names.collect();
+    let (input, follow, they) = match channels.len() {
+        1 => ("input", "follows", "it acts"),
+        _ => ("inputs", "follow", "they act"),
+    };
+    Decision {
+        kind: FindingKind::Feedback,
+        because: format!(
+            "{input} '{}' {follow} past errors of the output, as in a closed loop",
+            channels.join("', '")
+        ),
+        did: format!(
+            "{they} one sample later at the earliest, models with noise of their own compete (ARX, ARMAX, Box-Jenkins), and errors one \
+             step ahead decide"
+        ),
+        instead: "`model` or `focus`".to_owned(),
+        channels,
+    }
 }
 
 /// Orders without some inputs.
@@ -135,6 +172,11 @@ fn at_the_edge(chosen: &Orders, tried: &[Orders]) -> Option<String> {
 /// compared, and the chosen one says whether it keeps it.
 pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
     let inputs = record.inputs.len();
+    if inputs <= MOST_INPUTS
+        && let Some(pays) = exactly(record)
+    {
+        return pays;
+    }
     inputs <= MOST_INPUTS
         && CONSTANT_ORDERS.into_iter().any(|order| {
             are_enough(record, order * (1 + inputs), order)
@@ -143,8 +185,30 @@ pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
         })
 }
 
+/// Whether the least order of an ARX model that leaves nothing is less with a constant, where there is such an order. None of data with noise.
+fn exactly(record: &Record<'_>) -> Option<bool> {
+    let ones = vec![1.0; record.output.len()];
+    let with = least_exact(&record.with_inputs(std::slice::from_ref(&ones)), 1)?;
+    Some(least_exact(record, 0).is_none_or(|without| with < without))
+}
+
+/// The least order of an ARX model that leaves nothing, the last inputs being constants; none where there is no such order.
+fn least_exact(record: &Record<'_>, constants: usize) -> Option<usize> {
+    let named = record.inputs.len() - constants;
+    let enough = |order: &usize| are_enough(record, (order + 1) * (named + 1) + order, *order);
+    let orders = (1..=LONGEST).take_while(enough);
+    let models = orders.map(|order| Orders::arx(order, &vec![order + 1; named], &vec![0; named]));
+    let models: Vec<Orders> =
+        models.map(|orders| Ok(orders?.with_constants(constants))).collect::<Result<_, Error>>().ok()?;
+    let columns = Columns::new(models.iter(), record.inputs.len());
+    let rows = rows(record, &columns, &Samples::unknown(record, models.iter())).ok()?;
+    let fitted = Scaled::new(&rows).fit(&columns, &models.iter().collect::<Vec<_>>(), false);
+    let exact = |fitted: &Option<Fitted>| fitted.as_ref().is_some_and(|of| of.cost <= EXACT * energy(record));
+    fitted.iter().position(exact).map(|place| place + 1)
+}
+
 /// Which structures are tried.
-fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, Error> {
+fn structures(task: &Task<'_>, automatic: &Automatic, closed: bool) -> Result<Vec<Structure>, Error> {
     use Structure::{Ar, Arma, Armax, Arx, Bj, General, Oe};
     let driven = !task.inputs.is_empty();
     match automatic.structure {
@@ -161,6 +225,8 @@ fn structures(task: &Task<'_>, automatic: &Automatic) -> Result<Vec<Structure>, 
         )),
         Some(structure) => Ok(vec![structure]),
         None if !driven => Ok(vec![Ar, Arma]),
+        None if closed && task.initial == Initial::Estimate => Ok(vec![Bj]),
+        None if closed && task.initial != Initial::Drop => Ok(vec![Arx, Armax, Bj]),
         // Models with F take no dropped samples, and others no estimated initial conditions.
         None if task.initial == Initial::Drop => Ok(vec![Arx, Armax]),
         None if task.initial == Initial::Estimate => Ok(vec![Oe, Bj]),

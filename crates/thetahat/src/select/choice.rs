@@ -55,6 +55,8 @@ pub struct Automatic {
     pub structure: Option<Structure>,
     /// The delays, one for each input, if they are known.
     pub nk: Option<Vec<usize>>,
+    /// Whether nonlinear models are left out.
+    pub linear: bool,
 }
 
 /// Orders from a first to a last one, both included: what a person writes as `1..10`, or `2`.

@@ -10,9 +10,9 @@ use crate::estimate::{Common, Initial, Point, stretches};
 use crate::model::Orders;
 
 /// Of records with more samples, models of which some need a search see segments only: this many, each so long.
-const LONG: usize = 1 << 16;
-const SEGMENTS: usize = 16;
-const SEGMENT: usize = 1 << 11;
+pub(super) const LONG: usize = 1 << 16;
+pub(super) const SEGMENTS: usize = 16;
+pub(super) const SEGMENT: usize = 1 << 11;
 /// Of records with more samples, blocks are held out of segments only: few, so that free runs are long.
 const MOST_IN_BLOCKS: usize = 1 << 14;
 const SEGMENTS_OF_BLOCKS: usize = 4;
@@ -128,7 +128,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
 }
 
 /// The part of a record that blocks are held out of: of a long one segments of all there is.
-pub(super) fn few_for_blocks<'a>(record: &Record<'a>, all: &Record<'a>) -> Record<'a> {
+pub(crate) fn few_for_blocks<'a>(record: &Record<'a>, all: &Record<'a>) -> Record<'a> {
     let most = total(record) > MOST_IN_BLOCKS;
     let few = if most { stretches(all, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
     few.unwrap_or_else(|| record.clone())

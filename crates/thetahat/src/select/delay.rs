@@ -3,7 +3,8 @@
 //!
 //! A coefficient at lag 0 costs twice the price of another one: the input of a sampled plant acts one sample later, as a rule.
 //! In closed loop u(t) may follow y(t) at once, and explain it like an effect that is one; data alone do not tell the two
-//! apart, so the delay of 0 is taken, and feedback is a warning (see `validate::feedback`).
+//! apart, and most plants that are sampled answer later. So an input that follows the output for certain (see `validate::feedback`)
+//! has no lag 0.
 //!
 //! The confidence in a delay k is its posterior probability among all windows W that were compared,
 //!
@@ -28,7 +29,6 @@ use crate::data::Record;
 use crate::estimate::InformationCriterion;
 use crate::figures::fixed;
 use crate::model::Orders;
-use crate::validate::feedback;
 
 /// Orders of the models: na, and input lags.
 const DELAY_ORDER: usize = 10;
@@ -51,6 +51,8 @@ struct Long {
     columns: Columns,
     rows: Rows,
     scaled: Scaled,
+    /// The first lag that an input with a name may have.
+    first: Vec<usize>,
 }
 
 /// The lags of each input's B: none where it has no effect. Those of a constant and a trend come last.
@@ -64,6 +66,8 @@ struct Data<'a> {
     are_enough: &'a dyn Fn(usize, usize) -> bool,
     /// The rows of the columns of a model.
     rows: &'a dyn Fn(&Orders, &Columns) -> Result<Rows, Error>,
+    /// Which of the inputs with a name follow the output: those have no lag 0.
+    follows: &'a [bool],
 }
 
 impl Long {
@@ -73,7 +77,8 @@ impl Long {
         let columns = Columns::new(std::iter::once(&largest), inputs);
         let rows = (data.rows)(&largest, &columns)?;
         let scaled = Scaled::new(&rows);
-        Ok(Self { na, lags, end, columns, rows, scaled })
+        let first = data.follows.iter().copied().map(usize::from).collect();
+        Ok(Self { na, lags, end, columns, rows, scaled, first })
     }
 
     fn orders(&self, windows: &Windows) -> Result<Orders, Error> {
@@ -99,7 +104,8 @@ impl Long {
 
     /// The windows of an input, and the MDL of the models with them, the others having theirs. The first is none.
     fn scan(&self, windows: &Windows, input: usize) -> Result<Vec<(Range<usize>, f64)>, Error> {
-        let all = (0..self.end)
+        let first = self.first.get(input).copied().unwrap_or(0);
+        let all = (first..self.end)
             .flat_map(|start| (start + 1..=self.end.min(start + self.lags)).map(move |end| start..end));
         let own: Vec<Range<usize>> = std::iter::once(self.end..self.end).chain(all).collect();
         let models: Vec<Windows> = own
@@ -174,16 +180,17 @@ impl Long {
     }
 }
 
-/// The delays of the first inputs of a record, those that have a name; the others are a constant and a trend. None where there
-/// are too few samples, or too many inputs.
+/// The delays of the first inputs of a record, those that have a name, each with whether it follows the output; the others are a constant
+/// and a trend. None where there are too few samples, or too many inputs.
 ///
 /// # Errors
 /// [`Error::Data`] if squares leave the range of numbers.
-pub(crate) fn delays(record: &Record<'_>, names: &[String]) -> Result<Vec<Delay>, Error> {
+pub(crate) fn delays(record: &Record<'_>, names: &[String], follows: &[bool]) -> Result<Vec<Delay>, Error> {
     let data = Data {
         inputs: record.inputs.len(),
         are_enough: &|parameters, left_out| are_enough(record, parameters, left_out),
         rows: &|largest, columns| rows(record, columns, &Samples::unknown(record, std::iter::once(largest))),
+        follows,
     };
     found_in(&data, names)
 }
@@ -197,6 +204,7 @@ pub(crate) fn delays_of(
     moments: &LaggedMoments,
     signals: &[usize],
     names: &[String],
+    follows: &[bool],
 ) -> Result<Vec<Delay>, Error> {
     let data = Data {
         inputs: names.len(),
@@ -213,6 +221,7 @@ pub(crate) fn delays_of(
                  its sample time",
             ))
         },
+        follows,
     };
     found_in(&data, names)
 }
@@ -249,8 +258,12 @@ fn found_in(data: &Data<'_>, names: &[String]) -> Result<Vec<Delay>, Error> {
 }
 
 /// The delays, and what there is to say of them.
-pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Delay>, Vec<usize>), Error> {
-    let delays = delays(task.estimation, task.inputs)?;
+pub(super) fn found(
+    task: &Task<'_>,
+    follows: &[bool],
+    steps: &mut Vec<String>,
+) -> Result<(Vec<Delay>, Vec<usize>), Error> {
+    let delays = delays(task.estimation, task.inputs, follows)?;
     if delays.is_empty() {
         steps.push("Too few samples to find delays: they were taken to be 1.".to_owned());
         return Ok((delays, vec![1; task.inputs.len()]));
@@ -273,21 +286,8 @@ pub(super) fn found(task: &Task<'_>, steps: &mut Vec<String>) -> Result<(Vec<Del
             percent(*confidence)
         ));
     }
-    if delays.iter().any(|delay| delay.nk == 0 && delay.confidence.is_some()) {
-        let record = task.estimation;
-        let suspicions =
-            feedback::feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments).inputs;
-        for (delay, feedback) in delays.iter().zip(suspicions).filter(|(delay, _)| delay.nk == 0) {
-            let name = &delay.input;
-            steps.push(if feedback.is_some_and(|feedback| feedback.is_suspected()) {
-                format!(
-                    "{name} and the output go together at once, and past errors of the output predict {name}: that may be \
-                     feedback; `nk` 1 keeps it out."
-                )
-            } else {
-                format!("{name} and the output go together at once: it acts within the same sample.")
-            });
-        }
+    for Delay { input: name, .. } in delays.iter().filter(|of| of.nk == 0 && of.confidence.is_some()) {
+        steps.push(format!("{name} and the output go together at once: it acts within the same sample."));
     }
     let nk = delays.iter().map(|delay| delay.nk).collect();
     Ok((delays, nk))

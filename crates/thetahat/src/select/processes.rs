@@ -17,7 +17,8 @@ use thetahat_numerics::regression::sum;
 use super::candidates::total;
 use super::folds::Folds;
 use super::held_out::{BLOCKS, cut, deviation, mean_square};
-use super::winners::{GATE, both, logarithm};
+use super::selection::logarithm;
+use super::winners::GATE;
 use super::{HeldOut, ProcessCandidate, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::estimate::{
@@ -232,7 +233,7 @@ pub(crate) fn processes(
     });
     let mdl = |own: &ProcessCandidate| own.mdl.unwrap_or(f64::NEG_INFINITY);
     candidates.sort_by(|one, other| mdl(one).total_cmp(&mdl(other)));
-    let SelectedModel { mut selection, guess } = found;
+    let SelectedModel { mut selection, decisions, guess } = found;
     let mut taken = None;
     if let Some(best) = candidates.first() {
         let others: Vec<String> = candidates.iter().map(said).collect();
@@ -250,7 +251,7 @@ pub(crate) fn processes(
         });
     }
     selection.processes = candidates;
-    Ok((SelectedModel { selection, guess }, taken))
+    Ok((SelectedModel { selection, decisions, guess }, taken))
 }
 
 fn said(candidate: &ProcessCandidate) -> String {
@@ -296,8 +297,8 @@ fn verdict(selection: &Selection, best: &ProcessCandidate, free_run: Option<f64>
             None => (true, "the free run of the polynomial model grows without bound"),
         };
     };
-    let best = winners.simulation.held_out.map_or(both(&before), |seen| both(&seen).min(both(&before)));
-    if both(&own) > best + GATE {
+    let best = winners.simulation.held_out.map_or(before.both(), |seen| seen.both().min(before.both()));
+    if own.both() > best + GATE {
         return (false, "a polynomial model does better there");
     }
     (true, "no polynomial model does clearly better there")

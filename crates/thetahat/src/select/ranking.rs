@@ -106,7 +106,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         processes: Vec::new(),
         state_space: None,
     };
-    Ok(SelectedModel { selection, guess })
+    Ok(SelectedModel { selection, decisions: Vec::new(), guess })
 }
 
 /// What both winners are, how they differ, and which was taken why.

@@ -5,6 +5,14 @@ use super::{Focus, Path, Select};
 use crate::estimate::OrderScore;
 use crate::model::{Orders, ProcessStructure, Structure};
 
+/// Mean squares below this are rounding.
+const NOTHING: f64 = 1e-12;
+
+/// The logarithm of a mean square.
+pub(super) fn logarithm(square: f64) -> f64 {
+    square.max(NOTHING).ln()
+}
+
 /// How a model was chosen among others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Selection {
@@ -157,6 +165,11 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
+    /// The mean of the logarithms of both mean squares, by which models are compared.
+    pub(crate) fn both(&self) -> f64 {
+        f64::midpoint(logarithm(self.blocks), logarithm(self.onward))
+    }
+
     /// 100 (1 - |e|/|y - mean(y)|) on all blocks.
     pub fn percent(&self) -> f64 {
         100.0 * (1.0 - self.blocks.sqrt())

@@ -3,7 +3,7 @@ use thetahat_numerics::optimize::{Deadline, Monitor, Search};
 use super::choice::Select;
 use super::focus::Focus;
 use super::selection::Selection;
-use crate::data::Record;
+use crate::data::{Decision, Record};
 use crate::estimate::Initial;
 use crate::model::Orders;
 
@@ -30,7 +30,7 @@ impl<'a> Task<'a> {
     }
 
     /// Whether models are evaluated by more than errors one step ahead.
-    pub(super) fn looks_further(&self) -> bool {
+    pub(crate) fn looks_further(&self) -> bool {
         !self.inputs.is_empty() && self.focus.looks_further()
     }
 
@@ -44,7 +44,7 @@ impl<'a> Task<'a> {
     }
 
     /// The record to estimate on without these inputs.
-    pub(super) fn named_record(&self) -> Record<'a> {
+    pub(crate) fn named_record(&self) -> Record<'a> {
         let inputs = self.estimation.inputs[..self.inputs.len()].to_vec();
         Record { inputs, ..self.estimation.clone() }
     }
@@ -54,6 +54,8 @@ impl<'a> Task<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SelectedModel {
     pub(crate) selection: Selection,
+    /// What was done because of what the records show.
+    pub(crate) decisions: Vec<Decision>,
     /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found them: a
     /// start for the search on all samples.
     pub(crate) guess: Option<Vec<f64>>,

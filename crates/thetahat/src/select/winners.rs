@@ -14,6 +14,7 @@
 
 use super::candidates::Compared;
 use super::held_out::standard_errors;
+use super::selection::logarithm;
 use super::{Focus, HeldOut};
 
 /// By how much the logarithm of a mean square must fall, whatever its error.
@@ -24,8 +25,6 @@ const STANDARD_ERRORS: f64 = 2.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
-/// Mean squares below this are rounding.
-const NOTHING: f64 = 1e-12;
 
 /// Which models are the best for what, as positions in a comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,15 +34,6 @@ pub(super) struct Winners {
     /// S.
     pub(super) simulation: usize,
     pub(super) chosen: usize,
-}
-
-/// The mean of the two logarithms.
-pub(super) fn both(seen: &HeldOut) -> f64 {
-    f64::midpoint(logarithm(seen.blocks), logarithm(seen.onward))
-}
-
-pub(super) fn logarithm(square: f64) -> f64 {
-    square.max(NOTHING).ln()
 }
 
 /// The modulus of the slowest pole of a model that simulates.
@@ -59,7 +49,7 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let stable = |k: &usize| models[*k].radius < 1.0;
     let fast = |k: &usize| models[*k].radius <= slowest(samples);
     let prediction = (0..models.len()).find(stable)?;
-    let both = |k: usize| held_out(k).map(both);
+    let both = |k: usize| held_out(k).map(HeldOut::both);
     let inside = |k: &usize| !models[*k].has_ended_on_circle();
     let figures = (0..models.len()).filter(fast).filter(inside).filter_map(|k| Some((both(k)?, k)));
     let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));

@@ -62,6 +62,11 @@ const OUTSIDE: f64 = 1e-4;
 /// Below this p-value there may be feedback, if as much is explained.
 const LEVEL: f64 = 0.01;
 const EXPLAINED: f64 = 0.005;
+/// The same for feedback beyond doubt.
+const CERTAIN_LEVEL: f64 = 1e-6;
+const CERTAIN_EXPLAINED: f64 = 0.02;
+/// An input that changes no more often is that of a step test, and follows whatever happens to come before its steps.
+const FEW_CHANGES: usize = 5;
 /// An input repeats itself if it does so to this fraction of its largest value; this many comparisons are made for each sample.
 const REPEATED: f64 = 1e-6;
 const COMPARISONS: usize = 20;
@@ -86,6 +91,11 @@ impl Feedback {
     pub(crate) fn is_suspected(&self) -> bool {
         self.p_value < LEVEL && self.explained > EXPLAINED
     }
+
+    /// Whether there is feedback beyond doubt: so that a choice of models leaves out what needs a log without.
+    pub(crate) fn is_certain(&self) -> bool {
+        self.p_value < CERTAIN_LEVEL && self.explained > CERTAIN_EXPLAINED
+    }
 }
 
 /// What tells of a loop.
@@ -98,6 +108,11 @@ pub(crate) struct Loop {
 }
 
 impl Loop {
+    /// Which inputs follow the output beyond doubt.
+    pub(crate) fn certain(&self) -> Vec<bool> {
+        self.inputs.iter().map(|input| input.is_some_and(|found| found.is_certain())).collect()
+    }
+
     /// What an unstable plant says, in words.
     pub(crate) fn unstable(&self) -> Option<String> {
         let [modulus, deviation] = self.unstable_pole?.map(|value| fixed(value, 4));
@@ -175,7 +190,9 @@ pub(crate) fn follows(input: &[f64], innovations: &[f64], segments: &[Range<usiz
     let samples: usize = segments.iter().map(Range::len).sum();
     let [fewest, most] = OWN_PAST;
     let own = (samples / SAMPLES_OF_OWN_PAST).clamp(fewest, most);
-    if repeats(input, segments) {
+    let changes =
+        |rows: &Range<usize>| input[rows.clone()].windows(2).filter(|pair| pair[0] != pair[1]).count();
+    if segments.iter().map(changes).sum::<usize>() <= FEW_CHANGES || repeats(input, segments) {
         return None;
     }
     let beyond = |own| beyond(own, input, innovations, segments);

@@ -119,7 +119,7 @@ fn held_of_transfer_function(seconds: f64, rows: usize, runs: usize) -> [f64; 6]
         let channel = |name: &str, values| Channel { name: name.into(), values };
         let log = Log::new(vec![channel("u", u), channel("y", y)], seconds).expect("the case is sound");
         let structure = ProcessStructure::transfer_function(4, 1, false).expect("a structure");
-        let plan = ProcessPlan { free_start: true, ..ProcessPlan::new(&["u"], "y", structure) };
+        let plan = ProcessPlan { free_start: Some(true), ..ProcessPlan::new(&["u"], "y", structure) };
         let report =
             fit_process(&log, &[], &plan, &|_| ControlFlow::Continue(())).expect("the case is sound");
         for ((parameter, truth), count) in report.model.parameters().iter().zip(RESONANT).zip(&mut counts) {

@@ -4,8 +4,10 @@ use thetahat_numerics::regression::sum;
 
 use super::counts::Counts;
 use super::far::Distances;
+use crate::data::{Finding, Rows};
+use crate::inspect::named::{NAMED, name};
 use crate::inspect::saturation::{NEAR, crowded};
-use crate::inspect::{ChannelQuality, Saturation, channel::NAMED, moments, quantization};
+use crate::inspect::{ChannelQuality, Saturation, moments, quantization};
 
 /// Levels at a limit: it, those near it, and one more.
 const LEVELS: usize = NEAR + 2;
@@ -14,6 +16,7 @@ const LEVELS: usize = NEAR + 2;
 #[derive(Debug)]
 pub(super) struct ChannelTotals {
     pub(super) missing: usize,
+    missing_rows: Vec<Rows>,
     repeated: usize,
     /// The run that may go on, and whether it is the first.
     run: Option<Run>,
@@ -35,18 +38,27 @@ pub(super) struct ChannelTotals {
 struct Run {
     value: f64,
     rows: usize,
+    start: usize,
     first: bool,
     /// Whether the row before this one is of it.
     open: bool,
 }
 
+impl Run {
+    fn named(&self) -> Rows {
+        Rows::from_positions(&(self.start..self.start + self.rows))
+    }
+}
+
 /// A value near a limit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Level {
     value: f64,
     rows: usize,
     /// In runs of several, but for the first and the last.
     held: usize,
+    /// The first of these runs.
+    runs: Vec<Rows>,
 }
 
 /// The times and values of rows, and their products about the means, in units of `scale`: see `regression::lagged_moments`.
@@ -121,6 +133,7 @@ impl ChannelTotals {
         let most = ((1 << 20) / channels.max(1)).clamp(1 << 12, 1 << 16);
         Self {
             missing: 0,
+            missing_rows: Vec::new(),
             repeated: 0,
             run: None,
             begun: false,
@@ -141,6 +154,7 @@ impl ChannelTotals {
         for (position, &value) in values.iter().enumerate() {
             if value.is_nan() {
                 self.missing += 1;
+                name(&mut self.missing_rows, first + position);
                 if let Some(run) = &mut self.run {
                     run.open = false;
                 }
@@ -158,7 +172,8 @@ impl ChannelTotals {
                     self.repeated += 1;
                 }
                 run => {
-                    let next = Run { value, rows: 1, first: !self.begun, open: true };
+                    let next =
+                        Run { value, rows: 1, start: first + position, first: !self.begun, open: true };
                     self.begun = true;
                     if let Some(ended) = run.replace(next) {
                         self.end(ended, false);
@@ -198,26 +213,26 @@ impl ChannelTotals {
     }
 
     /// What there is to say of all rows, and what is left out. None follows.
-    pub(super) fn finish(&mut self, name: &str, role: Option<&str>) -> (ChannelQuality, Vec<String>) {
+    pub(super) fn finish(&mut self, channel: &str, role: Option<&str>) -> (ChannelQuality, Vec<Finding>) {
         if let Some(run) = self.run {
             self.end(run, true);
         }
         let mut words = Vec::new();
         let mut quality = ChannelQuality {
             missing: self.missing,
+            missing_rows: std::mem::take(&mut self.missing_rows),
             repeated: self.repeated,
             longest_hold: self.longest_hold,
-            ..ChannelQuality::without_values(name, role)
+            ..ChannelQuality::without_values(channel, role)
         };
         let Some([minimum, maximum]) = self.range() else { return (quality, words) };
         (quality.minimum, quality.maximum) = (Some(minimum), Some(maximum));
         quality.saturation = self.saturation();
         quality.quantization = self.values.as_ref().and_then(step);
         if self.rounded {
-            words.push(format!(
-                "channel '{name}' has more than {} different values: what it is rounded to is left out",
-                self.most
-            ));
+            let seen = format!("channel '{channel}' has more than {} different values", self.most);
+            let sentence = format!("{seen}: what it is rounded to is left out");
+            words.push(Finding::left_out(sentence).of(channel));
         }
         let spread = &self.spread;
         quality.mean = Some((spread.value / spread.scale).clamp(minimum, maximum));
@@ -232,10 +247,12 @@ impl ChannelTotals {
         quality.outlier_count = far.rows.len();
         quality.outliers = far.rows.iter().take(NAMED).map(|row| row + 1).collect();
         if far.more {
-            words.push(format!(
-                "channel '{name}' has more than {} values far from their neighbours: of these the farthest are counted",
+            let seen = format!(
+                "channel '{channel}' has more than {} values far from their neighbours",
                 self.most / 4
-            ));
+            );
+            let sentence = format!("{seen}: of these the farthest are counted");
+            words.push(Finding::left_out(sentence).of(channel));
         }
         (quality, words)
     }
@@ -248,7 +265,8 @@ impl ChannelTotals {
             Some(crowded(limit.held, most))
         };
         let (low, high) = rows(&self.lowest).zip(rows(&self.highest))?;
-        (low + high > 0).then_some(Saturation { low, high })
+        let runs = |levels: &[Level]| levels.first().map_or_else(Vec::new, |limit| limit.runs.clone());
+        Saturation::of(low, high, || runs(&self.lowest), || runs(&self.highest))
     }
 }
 
@@ -265,9 +283,13 @@ fn count(levels: &mut Vec<Level>, is_nearer: impl Fn(f64) -> bool, run: &Run, he
         Some(level) if level.value == run.value => {
             level.rows += run.rows;
             level.held += held;
+            if held > 0 && level.runs.len() < NAMED {
+                level.runs.push(run.named());
+            }
         }
         _ if position < LEVELS => {
-            levels.insert(position, Level { value: run.value, rows: run.rows, held });
+            let runs = if held > 0 { vec![run.named()] } else { Vec::new() };
+            levels.insert(position, Level { value: run.value, rows: run.rows, held, runs });
             levels.truncate(LEVELS);
         }
         _ => {}

@@ -5,7 +5,10 @@ use crate::Error;
 use crate::data::{GAP, JITTER, Regular, gap_of, shortest};
 use crate::inspect::Clock;
 use crate::inspect::clock::Ticks;
+use crate::inspect::named::NAMED;
 
+/// So many steps that may be gaps are kept.
+const MOST_LONG: usize = 1 << 12;
 /// This many different steps are told apart exactly.
 const MOST: usize = 1 << 16;
 
@@ -19,6 +22,10 @@ pub(super) struct Steps {
     largest: f64,
     range: (f64, f64),
     backward: usize,
+    /// The median step of the first part.
+    usual: f64,
+    /// The first steps that may be gaps: the row after each from 1, and its length.
+    long: Vec<(usize, f64)>,
     /// The first step that does not go forward: its row from 1, and whether the time repeats.
     first_backward: Option<(usize, bool)>,
 }
@@ -36,9 +43,19 @@ impl Steps {
             largest: 0.0,
             range: (f64::INFINITY, f64::NEG_INFINITY),
             backward: 0,
+            usual: f64::INFINITY,
+            long: Vec::new(),
             first_backward: None,
         };
         steps.add(time)?;
+        // A first part that never advances shows no gap.
+        let all = steps.rows;
+        steps.usual = steps.median().map_or(f64::INFINITY, |(median, _)| median);
+        for (row, pair) in time.windows(2).enumerate() {
+            steps.rows = row + 2;
+            steps.keep_long(pair[1] - pair[0]);
+        }
+        steps.rows = all;
         Ok(steps)
     }
 
@@ -72,12 +89,20 @@ impl Steps {
             }
             self.steps.push(step);
             self.range = (self.range.0.min(step), self.range.1.max(step));
+            self.keep_long(step);
             if step <= 0.0 {
                 self.backward += 1;
                 self.first_backward.get_or_insert((self.rows, step == 0.0));
             }
         }
         Ok(())
+    }
+
+    /// Keeps the step to the row at hand, if it may be a gap.
+    fn keep_long(&mut self, step: f64) {
+        if step > GAP * self.usual && self.long.len() < MOST_LONG {
+            self.long.push((self.rows, step));
+        }
     }
 
     /// The time of the first row.
@@ -139,12 +164,14 @@ impl Steps {
         let mean = total / count.max(1.0);
         let regular = self.steps.values().filter(|(step, _)| *step <= gap);
         let square: f64 = regular.map(|(step, times)| times as f64 * (step / median - mean).powi(2)).sum();
+        let long = self.long.iter().filter(|(_, step)| *step > gap);
         let clock = Clock {
             sample_time: median,
             measured: true,
             steps: self.range,
             jitter: (square / count.max(1.0)).sqrt(),
             gaps,
+            gap_rows: long.map(|(row, _)| *row).take(NAMED).collect(),
             irregular,
         };
         let ticks = Ticks {

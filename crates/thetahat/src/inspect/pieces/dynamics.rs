@@ -1,13 +1,17 @@
 //! Excitation, delay and feedback, in one pass.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use thetahat_numerics::regression::LaggedMoments;
 
 use super::input::{InputTotals, Twins};
 use super::part::Part;
 use crate::Error;
-use crate::data::{Channel, GAP, Log, Record, Rows};
-use crate::inspect::{DelayEstimate, Feedback, Inspection, InspectionPlan, delay, moments, spectrum};
+use crate::data::{Channel, Finding, GAP, Log, Record, Rows};
+use crate::inspect::{
+    DelayEstimate, Feedback, Inspection, InspectionPlan, delay, findings, moments, spectrum,
+};
 use crate::select::delays_of;
 use crate::validate::feedback::feedback;
 
@@ -144,16 +148,20 @@ impl Dynamics {
         }
         let stepped = moving.iter().zip(&self.inputs).filter(|(moves, _)| **moves);
         if stepped.clone().count() > 0 && stepped.clone().all(|(_, input)| input.steps()) {
-            inspection.warnings.push(
-                "whether the log is a step test that begins at rest is left out, as that needs all of it at once"
-                    .to_owned(),
-            );
+            inspection.findings.push(Finding::left_out(
+                "whether the log is a step test that begins at rest is left out, as that needs all of it at once",
+            ));
         }
         let driven: Vec<usize> = (0..plan.inputs.len())
             .filter(|&input| moving[input] && inspection.excitation[input].same_as.is_none())
             .collect();
-        self.delays(inspection, plan, &driven, moves(output))?;
-        self.of_the_first(inspection, plan, &driven)?;
+        let answers = moves(output);
+        let first = self.first_deviations(plan, &driven);
+        let follows = Self::loops(inspection, plan, &first);
+        self.delays(inspection, plan, (&driven, &follows), answers)?;
+        self.responses(inspection, &driven, &first);
+        inspection.doubt_steps();
+        inspection.share_delays();
         Ok(())
     }
 
@@ -162,15 +170,15 @@ impl Dynamics {
         &self,
         inspection: &mut Inspection,
         plan: &InspectionPlan,
-        driven: &[usize],
+        (driven, follows): (&[usize], &[bool]),
         answers: bool,
     ) -> Result<(), Error> {
         let Some(joint) = &self.joint else {
             inspection.delays = plan.inputs.iter().map(|name| DelayEstimate::unknown(name)).collect();
-            inspection.warnings.push(format!(
+            inspection.findings.push(Finding::left_out(format!(
                 "delays are left out, as there are more than {} inputs: name some (-u)",
                 MOST_SIGNALS - 1
-            ));
+            )));
             return Ok(());
         };
         let output = plan.inputs.len();
@@ -187,43 +195,63 @@ impl Dynamics {
         }
         let names: Vec<String> = driven.iter().map(|&input| plan.inputs[input].clone()).collect();
         let signals: Vec<usize> = std::iter::once(output).chain(driven.iter().copied()).collect();
-        match delays_of(joint, &signals, &names) {
+        let follows: Vec<bool> = driven.iter().map(|&input| follows[input]).collect();
+        match delays_of(joint, &signals, &names, &follows) {
             Ok(found) => {
                 for (&input, delay) in driven.iter().zip(found) {
                     inspection.delays[input].confidence = delay.confidence;
                     inspection.delays[input].nk = delay.confidence.map(|_| delay.nk);
                 }
             }
-            Err(why) => inspection.warnings.push(format!("delays are left out: {why}")),
+            Err(why) => inspection.findings.push(Finding::left_out(format!("delays are left out: {why}"))),
         }
         Ok(())
     }
 
-    /// Impulse responses and feedback, by the first rows.
-    fn of_the_first(
+    /// The deviations of the first rows, zero of what does not drive, and their segments.
+    fn first_deviations(
         &self,
-        inspection: &mut Inspection,
         plan: &InspectionPlan,
         driven: &[usize],
-    ) -> Result<(), Error> {
+    ) -> (Vec<Vec<f64>>, Vec<Range<usize>>) {
         let values = signals(&self.first);
         let segments = Part { log: &self.first, past: 0 }.segments(&values);
-        let mut deviations: Vec<Vec<f64>> =
-            values.iter().map(|values| moments::deviations(values, &segments)).collect();
-        for (input, signal) in deviations.iter_mut().enumerate().take(plan.inputs.len()) {
-            if !driven.contains(&input) {
-                signal.fill(0.0);
-            }
-        }
-        let Some((output, inputs)) = deviations.split_last() else { return Ok(()) };
-        let found = feedback(inputs, output, &segments);
-        inspection.warnings.extend(found.unstable().map(|words| format!("{words}, in the first rows")));
+        let of = |(signal, values): (usize, &&[f64])| {
+            let drives = signal >= plan.inputs.len() || driven.contains(&signal);
+            if drives { moments::deviations(values, &segments) } else { vec![0.0; values.len()] }
+        };
+        (values.iter().enumerate().map(of).collect(), segments)
+    }
+
+    /// Feedback, by the first rows; gives which inputs follow the output beyond doubt.
+    fn loops(
+        inspection: &mut Inspection,
+        plan: &InspectionPlan,
+        (deviations, segments): &(Vec<Vec<f64>>, Vec<Range<usize>>),
+    ) -> Vec<bool> {
+        let Some((output, inputs)) = deviations.split_last() else { return Vec::new() };
+        let found = feedback(inputs, output, segments);
+        let unstable =
+            found.unstable().map(|seen| findings::of_unstable(format!("{seen}, in the first rows")));
+        inspection.findings.extend(unstable);
+        let certain = found.certain();
         inspection.feedback =
             plan.inputs.iter().zip(found.inputs).map(|(name, found)| Feedback::new(name, found)).collect();
-        inspection.warnings.push(format!(
+        certain
+    }
+
+    /// Impulse responses, by the first rows.
+    fn responses(
+        &self,
+        inspection: &mut Inspection,
+        driven: &[usize],
+        (deviations, segments): &(Vec<Vec<f64>>, Vec<Range<usize>>),
+    ) {
+        let Some((output, inputs)) = deviations.split_last() else { return };
+        inspection.findings.push(Finding::left_out(format!(
             "impulse responses and feedback are those of the first {} rows",
             self.first.rows()
-        ));
+        )));
         let record = Record {
             output,
             inputs: driven.iter().map(|&input| inputs[input].as_slice()).collect(),
@@ -233,14 +261,12 @@ impl Dynamics {
         if !segments.is_empty() {
             delay::respond(&mut inspection.delays, driven, &record);
         }
-        let unit = |signal: usize| moments::unit(values[signal], &deviations[signal], &segments);
-        let of_output = unit(plan.inputs.len());
+        let values = signals(&self.first);
+        let unit = |signal: usize| moments::unit(values[signal], &deviations[signal], segments);
+        let of_output = unit(inputs.len());
         for (input, delay) in inspection.delays.iter_mut().enumerate() {
             delay.scale(of_output.zip(unit(input)).map_or(f64::NAN, |(output, input)| output / input));
         }
-        inspection.doubt_steps();
-        inspection.share_delays();
-        Ok(())
     }
 }
 

@@ -139,14 +139,23 @@ fn clipped_values_are_saturated() {
             assert!(values[0] != limit && values[999] != limit);
             values.iter().filter(|value| **value == limit).count()
         };
-        let expected = Saturation { low: count(-0.7), high: count(0.9) };
-        assert_eq!(quality(values).saturation, Some(expected), "{decimals}");
+        let expected = (count(-0.7), count(0.9));
+        let found = quality(values.clone()).saturation.expect("it rests at both limits");
+        assert_eq!((found.low, found.high), expected, "{decimals}");
+        for (rows, limit) in [(&found.low_rows, -0.7), (&found.high_rows, 0.9)] {
+            assert!(rows.iter().all(|rows| rows.len() > 1), "{rows:?}");
+            assert!(
+                rows.iter().flat_map(|rows| rows.positions()).all(|row| values[row] == limit),
+                "{rows:?}"
+            );
+        }
     }
     // Of clipped noise the rows with another one beside them.
     let values: Vec<f64> = normal(17, 2000).iter().map(|x| x.min(1.0)).collect();
     let beside = |row: usize| values[row - 1] == 1.0 || values[row + 1] == 1.0;
     let high = (1..1999).filter(|&row| values[row] == 1.0 && beside(row)).count();
-    assert_eq!(quality(values).saturation, Some(Saturation { low: 0, high }));
+    let found = quality(values).saturation.expect("it rests at its largest value");
+    assert_eq!((found.low, found.high, found.low_rows), (0, high, Vec::new()));
     let values: Vec<f64> = limited(-2.0, 0.9, 15).iter().map(|x| 1e-300 * x).collect();
     assert!(
         quality(values).saturation.is_some_and(|saturation| saturation.low == 0 && saturation.high > 100)

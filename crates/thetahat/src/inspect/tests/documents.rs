@@ -19,7 +19,7 @@ pub(super) fn inspected(recording: Recording, plan: &InspectionPlan) -> Inspecti
 }
 
 fn says(inspection: &Inspection, what: &str) -> bool {
-    inspection.warnings.iter().any(|warning| warning.contains(what))
+    inspection.warnings().iter().any(|warning| warning.contains(what))
 }
 
 #[test]
@@ -31,7 +31,7 @@ fn a_good_log_gets_no_warning() {
     );
     assert_eq!(found.schema, "thetahat.inspection/1");
     assert_eq!((found.rows, found.log.rows), (600, "1..600".parse().unwrap()));
-    assert_eq!(found.warnings, [""; 0]);
+    assert_eq!(found.warnings(), [""; 0]);
     let roles: Vec<Option<&str>> = found.channels.iter().map(|channel| channel.role.as_deref()).collect();
     assert_eq!(roles, [Some("input"), Some("output"), None]);
     assert_eq!((found.excitation[0].order, found.delays[0].nk), (50, Some(3)));
@@ -120,7 +120,7 @@ fn every_fault_has_its_word() {
     let found =
         inspected(recording(&[("u", &u), ("y", &y)], Times::Measured(time)), &plan(&["u"], Some("y")));
     for word in ["misses 1 of 600", "at row 21:", "1 gap "] {
-        assert!(says(&found, word), "{word}: {:?}", found.warnings);
+        assert!(says(&found, word), "{word}: {:?}", found.warnings());
     }
     assert_eq!((found.clock.gaps, found.clock.irregular), (1, false));
 
@@ -153,7 +153,7 @@ fn every_fault_has_its_word() {
         "'empty' has no values",
         "no effect of input 'sine'",
     ] {
-        assert!(says(&found, word), "{word}: {:?}", found.warnings);
+        assert!(says(&found, word), "{word}: {:?}", found.warnings());
     }
     assert!(!says(&found, "no effect of input 'dead'"));
 

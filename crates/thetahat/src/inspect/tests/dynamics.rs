@@ -177,7 +177,7 @@ fn correlation_of(input: &[f64], output: &[f64]) -> DelayEstimate {
 
 fn delay_of(input: &[f64], output: &[f64]) -> DelayEstimate {
     let mut found = [correlation_of(input, output)];
-    delay::estimate(&mut found, &[deviations(input)], &deviations(output), &whole(input)).unwrap();
+    delay::estimate(&mut found, &[deviations(input)], &deviations(output), &whole(input), &[false]).unwrap();
     let [found] = found;
     found
 }

@@ -18,7 +18,7 @@ pub use dynamics::Transient;
 pub(super) use dynamics::{bode, eigenvalues, roots, transient, transients};
 pub(super) use response::{measured, measured_noise};
 pub(super) use search::{delays, score, search};
-pub(super) use signals::{Marked, Shade, Stack, outputs};
+pub(super) use signals::{Shade, Stack, outputs};
 pub(super) use spectrum::spectrum;
 pub(super) use states::{orders, singular_values};
 pub(super) use step::step_response;

@@ -3,29 +3,20 @@
 use thetahat_numerics::optimize::Monitor;
 
 use crate::Error;
-use crate::data::{Log, Source};
-use crate::estimate::{Initial, Method};
+use crate::data::{Decision, Log, Source};
 use crate::report::{Plan, Report, StateSpacePlan, fit_state_space_monitored};
-use crate::select::{Automatic, Choice, Focus, Select, Selection};
+use crate::select::Selection;
 
 /// A log as it was read, and how a model in state space is fitted to it.
-pub(super) struct InStates {
-    log: Log,
+pub(super) struct InStates<'l> {
+    log: &'l Log,
     plan: StateSpacePlan,
 }
 
-impl InStates {
+impl<'l> InStates<'l> {
     /// None where the plan asks for something that a model in state space is not.
-    pub(super) fn of(log: &Log, plan: &Plan) -> Option<Self> {
-        let free = matches!(&plan.choice, Choice::Automatic(Automatic { structure: None, nk: None }))
-            && matches!(plan.method, Method::PredictionError(_))
-            && plan.select == Select::MDL
-            && plan.focus == Focus::Auto
-            && plan.initial == Initial::Auto
-            && plan.prefilter.is_none()
-            && !plan.trend
-            && !plan.inputs.is_empty();
-        let plan = || StateSpacePlan {
+    pub(super) fn of(log: &'l Log, plan: &Plan) -> Option<Self> {
+        let own = || StateSpacePlan {
             inputs: plan.inputs.clone(),
             outputs: vec![plan.output.clone()],
             estimate: plan.estimate.clone(),
@@ -36,7 +27,7 @@ impl InStates {
             constant: plan.constant,
             ..StateSpacePlan::new(&[], &[])
         };
-        free.then(|| Self { log: log.clone(), plan: plan() })
+        plan.leaves_all_open().then(|| Self { log, plan: own() })
     }
 
     /// The fit of the order that was taken.
@@ -47,11 +38,12 @@ impl InStates {
         self,
         order: usize,
         selection: Selection,
-        sources: &[Source],
-        monitor: Monitor<'_>,
+        decisions: Vec<Decision>,
+        (sources, monitor): (&[Source], Monitor<'_>),
     ) -> Result<Report, Error> {
         let plan = StateSpacePlan { orders: Some(order..=order), ..self.plan };
-        let report = fit_state_space_monitored(&self.log, sources, &plan, monitor)?;
-        Ok(Report { selection: Some(selection), ..report })
+        let report = fit_state_space_monitored(self.log, sources, &plan, monitor)?;
+        let decisions = [decisions, report.decisions].concat();
+        Ok(Report { selection: Some(selection), decisions, ..report })
     }
 }

@@ -199,7 +199,7 @@ fn choices_find_the_model_of_a_step_test() {
         path: Path::All,
     };
     let (u, y) = step_test(20, 0.3);
-    let automatic = Automatic { structure: Some(crate::model::Structure::Oe), nk: None };
+    let automatic = Automatic { structure: Some(crate::model::Structure::Oe), ..Automatic::default() };
     for choice in [Choice::Grid(grid), Choice::Automatic(automatic)] {
         let report = fitted(&u, &y, &Plan::new(&["u"], "y", choice));
         let gain = report.polynomials().dc_gain[0].unwrap();

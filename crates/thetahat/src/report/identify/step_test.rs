@@ -3,7 +3,7 @@
 use thetahat_numerics::optimize::Monitor;
 
 use crate::Error;
-use crate::data::{Detrend, Log, Offset, Rows, Source};
+use crate::data::{Decision, Detrend, Log, Offset, Rows, Source};
 use crate::estimate::{Background, Constant, Initial, Method};
 use crate::model::ProcessStructure;
 use crate::report::{Plan, ProcessPlan, Report, fit_process};
@@ -11,19 +11,19 @@ use crate::respond::process::{HeldLog, held_logs};
 use crate::select::{Automatic, Choice, Focus, SelectedModel, Selection, Task, is_step_test, processes};
 
 /// A log with few steps, as it was read.
-pub(super) struct StepTest {
-    log: Log,
+pub(super) struct StepTest<'l> {
+    log: &'l Log,
     held: Vec<HeldLog>,
     plan: ProcessPlan,
 }
 
-impl StepTest {
+impl<'l> StepTest<'l> {
     /// None where the log is none, or the plan asks for something that a process is not.
     ///
     /// # Errors
     /// [`Error::Data`] for channels that are not there.
-    pub(super) fn of(log: &Log, plan: &Plan, rows: &[Rows]) -> Result<Option<Self>, Error> {
-        let free = matches!(&plan.choice, Choice::Automatic(Automatic { structure: None, nk: None }))
+    pub(super) fn of(log: &'l Log, plan: &Plan, rows: &[Rows]) -> Result<Option<Self>, Error> {
+        let free = matches!(&plan.choice, Choice::Automatic(Automatic { structure: None, nk: None, .. }))
             && !plan.select.is_held_out()
             && matches!(plan.focus, Focus::Auto | Focus::Simulation)
             && matches!(plan.initial, Initial::Auto | Initial::Zero)
@@ -53,10 +53,10 @@ impl StepTest {
             split: plan.split,
             offsets: Vec::new(),
             trend: plan.trend,
-            free_start: false,
+            free_start: if plan.initial == Initial::Zero { Some(false) } else { None },
             search: search.clone(),
         };
-        Ok(Some(Self { log: log.clone(), held, plan }))
+        Ok(Some(Self { log, held, plan }))
     }
 
     /// Processes beside the polynomial model that was chosen; also the structure of the one that is taken, if one is.
@@ -81,11 +81,12 @@ impl StepTest {
         self,
         structure: ProcessStructure,
         selection: Selection,
-        sources: &[Source],
-        monitor: Monitor<'_>,
+        decisions: Vec<Decision>,
+        (sources, monitor): (&[Source], Monitor<'_>),
     ) -> Result<Report, Error> {
         let plan = ProcessPlan { structures: vec![structure], ..self.plan };
-        let report = fit_process(&self.log, sources, &plan, monitor)?;
-        Ok(Report { selection: Some(selection), ..report })
+        let report = fit_process(self.log, sources, &plan, monitor)?;
+        let decisions = [decisions, report.decisions].concat();
+        Ok(Report { selection: Some(selection), decisions, ..report })
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_numerics::optimize::Search;
+use thetahat_numerics::regression::Monomials;
 
 use crate::Error;
 use crate::data::{Detrend, Rows, Split};
@@ -213,6 +214,15 @@ impl NonlinearArxPlan {
         }
     }
 
+    /// How many products of a degree there are of the regressors.
+    pub(in crate::report) fn products(&self, degree: usize) -> Result<usize, Error> {
+        let inputs = self.input_lags.iter().map(|input| input.lags);
+        let expressions = self.read_expressions()?;
+        let expressions = expressions.iter().map(|expression| self.lags_of(expression).len());
+        let regressors = self.output_lags.iter().copied().chain(inputs).chain(expressions).sum();
+        Ok(Monomials::new(regressors, degree).map_or(usize::MAX, |all| all.count()))
+    }
+
     /// How many rows before a row the model reads at most.
     pub fn lags(&self) -> usize {
         let of_inputs = self.input_lags.iter().filter(|input| input.lags > 0);
@@ -272,7 +282,7 @@ impl NonlinearArxPlan {
     }
 
     /// How far the runs go whose errors are made small.
-    pub(super) fn horizon(&self) -> Horizon {
+    pub(in crate::report) fn horizon(&self) -> Horizon {
         let driven = self.input_lags.iter().any(|input| input.lags > 0);
         let trains = self.map.trained().is_some() || self.map == MapPlan::Auto;
         self.focus.unwrap_or(if trains && driven { Horizon::FreeRun } else { Horizon::ONE_STEP })
@@ -290,7 +300,7 @@ impl NonlinearArxPlan {
     ///
     /// # Errors
     /// None for a plan that was checked.
-    pub(super) fn holding_out(&self) -> Result<Self, Error> {
+    pub(in crate::report) fn holding_out(&self) -> Result<Self, Error> {
         let [estimation, validation, test] = SPLIT;
         let needs = self.compares_trained() && self.validate.is_empty() && self.select.is_none();
         let split = match self.split {

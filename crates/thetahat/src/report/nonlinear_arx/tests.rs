@@ -9,7 +9,7 @@ use super::*;
 use crate::data::{Channel, Detrend};
 use crate::estimate::Constant;
 use crate::model::Orders;
-use crate::report::{Plan, ValidationPlan, identify, validate};
+use crate::report::{Plan, ValidationPlan, fit_nonlinear_arx, identify, validate};
 use crate::respond::InitialCondition;
 use crate::select::Select;
 

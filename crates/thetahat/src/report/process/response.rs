@@ -84,7 +84,7 @@ pub fn fit_process_to_response(
         ("split", plan.split.is_some()),
         ("offset", !plan.offsets.is_empty()),
         ("trend", plan.trend),
-        ("initial", plan.free_start),
+        ("initial", plan.free_start == Some(true)),
     ];
     if let Some((name, _)) = of_logs.iter().find(|(_, given)| *given) {
         return Err(Error::argument(
@@ -98,7 +98,7 @@ pub fn fit_process_to_response(
     let found = least_response_errors(&structures, &names, &points, &plan.search, monitor)?;
     let signal = |name: &String| Signal { name: name.clone(), offset: Offset::default() };
     let inputs: Vec<Signal> = plan.inputs.iter().map(signal).collect();
-    let own = model(plan, response.sample_time, inputs, structures, &names, &found)?;
+    let own = model(plan, response.sample_time, inputs, structures, &names, (false, &found))?;
     // What e is in the time of the samples the noise of the response says, if it does.
     let own = ProcessModel { noise_variance: noise(response), degrees_of_freedom: None, ..own };
     let rows = response.logs.last().map(|log| log.rows).or_else(|| response.rows.last().copied());
@@ -143,6 +143,7 @@ pub fn fit_process_to_response(
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
         data,
         selection: None,
+        decisions: Vec::new(),
         model: Model::from(own),
         estimation,
         fit: Vec::new(),

@@ -156,7 +156,7 @@ fn inputs_logs_slopes_and_starts_are_told_apart() {
     let part =
         |u: &[f64], y: &[f64]| Log::recorded(vec![channel("u", u), channel("y", y)], times.clone()).unwrap();
     let joined = Log::join(vec![part(&u, &y), part(&second, &again)]).unwrap();
-    let free = ProcessPlan { free_start: true, ..super::tests::plan("p1") };
+    let free = ProcessPlan { free_start: Some(true), ..super::tests::plan("p1") };
     let report = fit(&joined, &free).unwrap();
     let found = values(&report);
     assert!((found[0] - 2.0).abs() < 1e-6 && (found[1] - 3.0).abs() < 1e-6, "{found:?}");

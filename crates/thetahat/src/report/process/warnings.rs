@@ -2,11 +2,13 @@
 
 use thetahat_numerics::optimize::Stopped;
 
+use crate::data::Record;
 use crate::estimate::Procedure;
 use crate::figures::{number, short};
 use crate::model::{Parameter, ProcessModel, polynomial};
 use crate::report::Estimation;
 use crate::respond::process::HeldLog;
+use crate::validate::feedback::feedback;
 
 /// A time constant shorter than this part of a sample is not seen, nor one longer than the log.
 const SHORT: f64 = 0.1;
@@ -22,6 +24,25 @@ fn is_lag(name: &str) -> bool {
     name.starts_with("tau") && !name.starts_with("tau_z")
 }
 
+/// Whether a state in which the log begins would explain so much that it is not at rest there.
+pub(super) fn begins_in_motion(explained_by_starts: f64) -> bool {
+    explained_by_starts > STARTS
+}
+
+/// What there is to say of inputs that follow the output: the errors of a free run are not those of the process then.
+pub(super) fn of_feedback(inputs: &[String], record: &Record<'_>) -> Vec<String> {
+    let follows = feedback(&record.inputs, record.output, &record.segments).certain();
+    let names = inputs.iter().zip(follows).filter(|(_, follows)| *follows);
+    names
+        .map(|(name, _)| {
+            format!(
+                "input '{name}' follows past errors of the output, as in a closed loop: the free run of a process is biased there; fit a \
+                 model with noise (arx, armax, bj)"
+            )
+        })
+        .collect()
+}
+
 pub(super) fn of_fit(
     model: &ProcessModel,
     held: &[HeldLog],
@@ -29,7 +50,7 @@ pub(super) fn of_fit(
     explained_by_starts: f64,
 ) -> Vec<String> {
     let mut words = Vec::new();
-    if explained_by_starts > STARTS {
+    if begins_in_motion(explained_by_starts) {
         words.push(format!(
             "{:.0} % of the squared errors are what is left of a state in which the log begins: it is not at rest with its first inputs; \
              estimate the state, with `initial` estimate",

@@ -7,7 +7,7 @@ fn automatic(
     structure: Option<Structure>,
     nk: Option<Vec<usize>>,
 ) -> Result<Selection, Error> {
-    let choice = Choice::Automatic(Automatic { structure, nk });
+    let choice = Choice::Automatic(Automatic { structure, nk, ..Automatic::default() });
     chosen(record, None, &choice, Select::MDL, Initial::Auto).map(|found| found.selection)
 }
 
@@ -72,7 +72,7 @@ fn the_confidence_is_the_posterior_weight_of_the_delay() {
     let mut noise = Noise(41);
     let (u, e) = (noise.take(40), noise.take(40));
     let y = sum(&filtered(&[0.0, 0.0, 1.0], &[1.0, -0.5], &u), &e, 0.3);
-    let found = delays(&Record::new(&y, vec![&u]).unwrap(), &["u".to_owned()]).unwrap();
+    let found = delays(&Record::new(&y, vec![&u]).unwrap(), &["u".to_owned()], &[false]).unwrap();
     // Of 40 samples there are ARX models of order 3 with 4 lags; 5 samples are before all of them.
     let (mut own, mut all) = (0.0, 0.0);
     for (start, end) in

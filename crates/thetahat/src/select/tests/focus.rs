@@ -159,7 +159,7 @@ fn blocks_are_looked_at_as_far_ahead_as_the_focus_says() {
     let (u, e) = (noise.take(400), noise.take(400));
     let y = sum(&filtered(&[0.0, 1.0], &F, &u), &filtered(&[1.0], &F, &e), 0.3);
     let record = Record::new(&y, vec![&u]).unwrap();
-    let choice = Choice::Automatic(Automatic { structure: Some(Structure::Arx), nk: None });
+    let choice = Choice::Automatic(Automatic { structure: Some(Structure::Arx), ..Automatic::default() });
     let figure = |focus| {
         let selection = focused(&record, &choice, focus).unwrap().selection;
         let model = selection.best.into_iter().find(|model| model.orders.to_string() == "ARX(2, 1, 1)");

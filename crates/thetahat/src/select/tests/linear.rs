@@ -35,7 +35,7 @@ fn costs_of_a_grid_are_those_of_single_fits_on_common_samples() {
     let ([y, u, v], segments) = signals();
     let record = record(&y, &[&u, &v], &segments);
     for initial in [Initial::Auto, Initial::Drop, Initial::Zero] {
-        let SelectedModel { selection, guess } =
+        let SelectedModel { selection, guess, .. } =
             chosen(&record, None, &Choice::Grid(grid_of_two()), Select::MDL, initial).unwrap();
         // The largest reaches back 4 samples; the short segment has two more.
         let samples = if initial == Initial::Zero { 286 } else { 274 };

@@ -98,7 +98,7 @@ fn a_search_for_each_finds_nothing_lower_among_the_best() {
     let (y, u) = signals(41, 600);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..600)));
     let choice = Choice::Grid(grid(range(1, 3), range(1, 3), range(0, 3), 0.into(), 0.into()));
-    let SelectedModel { selection, guess } =
+    let SelectedModel { selection, guess, .. } =
         chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
     assert_eq!(selection.chosen.orders, Orders::armax(2, &[2], 2, &[1]).unwrap());
     assert_eq!(guess.unwrap().len(), 6);

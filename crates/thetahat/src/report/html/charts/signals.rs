@@ -27,12 +27,6 @@ pub(crate) struct Shade {
     pub(crate) rows: Vec<Rows>,
 }
 
-/// Points to be told apart from the others, as 1-based rows.
-pub(crate) struct Marked<'a> {
-    pub(crate) name: &'static str,
-    pub(crate) rows: &'a [usize],
-}
-
 /// Panels above each other over one time axis.
 pub(crate) struct Stack<'a> {
     time: &'a [f64],
@@ -140,18 +134,22 @@ impl<'a> Stack<'a> {
         self.traces.push(trace);
     }
 
-    /// Marks at some rows of a signal.
-    pub(crate) fn marks(&mut self, marked: &Marked<'_>, values: &[f64], legend: bool) {
-        let at = marked.rows.iter().filter_map(|row| row.checked_sub(1));
-        let points = at.filter_map(|row| Some((*self.time.get(row)?, *values.get(row)?)));
-        let points = points.filter(|(_, value)| value.is_finite());
-        let (x, y): (Vec<f64>, Vec<f64>) = points.map(|(x, y)| (self.at(x), significant(y))).unzip();
+    /// Marks rows of a signal under a name, which the legend has once: single rows, or from the first to the last where the signal stays
+    /// at a value.
+    pub(crate) fn marks(&mut self, name: &str, rows: &[Rows], values: &[f64], legend: bool) {
+        let at = |row: usize| Some((self.at(*self.time.get(row)?), significant(*values.get(row)?)));
+        let ends = rows.iter().filter_map(|rows| Some([at(rows.first() - 1)?, at(rows.last() - 1)?]));
+        let lines = ends.filter(|ends| ends.iter().all(|(_, value)| value.is_finite()));
+        // A value that is no number ends a line.
+        let points = lines.flat_map(|[first, last]| [first, last, (last.0, f64::NAN)]);
+        let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
         if x.is_empty() {
             return;
         }
-        let trace = scatter(marked.name, x, y, "markers")
+        let trace = scatter(name, x, y, "lines+markers")
+            .with("line", stroke(COLOURS[1], 2.5))
             .with("marker", marker(COLOURS[1], 10).with("symbol", "circle-open"))
-            .with("legendgroup", marked.name)
+            .with("legendgroup", name)
             .with("showlegend", legend)
             .with("yaxis", self.axis());
         self.traces.push(trace);

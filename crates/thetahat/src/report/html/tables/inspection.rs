@@ -65,6 +65,7 @@ pub(in crate::report::html) fn channels(inspection: &Inspection) -> Table {
             channel.quantization.map_or_else(|| "none".to_owned(), short),
             channel
                 .saturation
+                .as_ref()
                 .map_or_else(|| "no".to_owned(), |rests| format!("{}, {}", rests.low, rests.high)),
             outliers,
         ]);

@@ -4,6 +4,7 @@ use thetahat_numerics::random::Random;
 
 use super::*;
 use crate::model::Activation;
+use crate::report::fit_nonlinear_arx_monitored;
 use crate::respond::nonlinear_arx::NonlinearArxOnLog;
 use crate::respond::{InitialCondition, OnLog};
 

@@ -1,10 +1,10 @@
-//! The choice among all maps, and the linear model that takes part in it.
+//! Fits of nonlinear ARX models: of a map that is named, or of the best of all, among which a linear model takes part.
+
+use std::ops::ControlFlow;
 
 use thetahat_numerics::optimize::Monitor;
-use thetahat_numerics::regression::Monomials;
 
-use super::fit_planned;
-use super::plan::{InputLags, MapPlan, NonlinearArxPlan};
+use super::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
 use crate::Error;
 use crate::data::{Log, Rows, Source};
 use crate::estimate::{MapsOutcome, Procedure, RunFigures, TermStep};
@@ -42,13 +42,82 @@ struct Parts<'l> {
     monitor: Monitor<'l>,
 }
 
+/// Fits a nonlinear ARX model,
+///
+/// ```text
+/// y(t) = sum_j theta_j f_j(z(t)) + e(t)
+/// ```
+///
+/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map.
+/// Of functions that are known forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
+/// 1989). Products are chosen from moments, without a matrix of all of them, and the parameters come from a QR of the chosen ones; their
+/// covariance is that of a linear regression with white noise. How many are taken is what the free run says of rows that they were not
+/// fitted to, an information criterion, or given. Functions with numbers of their own, such as the weights of a network, are trained: a
+/// search from several starts for the least errors of free runs, or of shorter ones.
+///
+/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions; of a training
+/// O(N (p^2 + na p)) for each iteration on p numbers.
+///
+/// # Errors
+/// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are not there, an
+/// irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is constant, or
+/// functions depend on one another.
+///
+/// ```
+/// use thetahat::data::{Channel, Detrend, Log};
+/// use thetahat::report::{NonlinearArxPlan, fit_nonlinear_arx};
+///
+/// // y(t) = 0.5 y(t-1) + u(t-1)^2, without noise.
+/// let (mut u, mut y, mut random) = (Vec::new(), vec![0.0], 1_u32);
+/// for t in 0..200 {
+///     random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///     u.push(f64::from(random >> 16) / 32_768.0 - 1.0);
+///     y.push(0.5 * y[t] + u[t] * u[t]);
+/// }
+/// y.pop();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0)?;
+/// let plan = NonlinearArxPlan {
+///     terms: Some(2),
+///     raw_terms: true,
+///     detrend: Detrend::None,
+///     ..NonlinearArxPlan::new(&["u"], &["y"])
+/// };
+/// let report = fit_nonlinear_arx(&log, &[], &plan)?;
+/// let [first, second] = report.model.parameters() else { panic!("two terms") };
+/// assert_eq!((first.name.as_str(), second.name.as_str()), ("u(k-1)^2", "y(k-1)"));
+/// assert!((first.value - 1.0).abs() < 1e-12 && (second.value - 0.5).abs() < 1e-12);
+/// # Ok::<(), thetahat::Error>(())
+/// ```
+pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan) -> Result<Report, Error> {
+    fit_nonlinear_arx_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
+}
+
+/// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may end it.
+///
+/// # Errors
+/// As for [`fit_nonlinear_arx`]; [`Error::Interrupted`] if the monitor says so.
+pub fn fit_nonlinear_arx_monitored(
+    log: &Log,
+    sources: &[Source],
+    plan: &NonlinearArxPlan,
+    monitor: Monitor<'_>,
+) -> Result<Report, Error> {
+    plan.check()?;
+    let plan = &plan.holding_out()?;
+    match plan.map {
+        MapPlan::Auto => best(log, sources, plan, monitor),
+        _ => fit_planned(log, sources, plan, monitor),
+    }
+}
+
 /// Fits the linear model that the data choose, products of two degrees, as they are and trained for longer runs, and networks of two sizes,
 /// and takes the first, in this order, whose run over held-out rows has an error of no more than 1.1 times that of the best one. Where lags
 /// are chosen each is tried with those of the plan and with those of the linear model.
 ///
 /// # Errors
-/// As for [`fit_nonlinear_arx`](super::fit_nonlinear_arx).
-pub(super) fn best(
+/// As for [`fit_nonlinear_arx`].
+fn best(
     log: &Log,
     sources: &[Source],
     plan: &NonlinearArxPlan,
@@ -68,7 +137,7 @@ pub(super) fn best(
             let kind = |focus| NonlinearArxPlan { map: map.clone(), focus: Some(focus), ..own.clone() };
             if let MapPlan::Polynomial { degree } = map {
                 // A choice among more products than samples finds what fits by chance.
-                if products(own, degree)? > parts.rows() {
+                if own.products(degree)? > parts.rows() {
                     continue;
                 }
                 plans.push(kind(Horizon::ONE_STEP));
@@ -147,15 +216,6 @@ fn maps() -> impl Iterator<Item = MapPlan> {
     products.chain(networks)
 }
 
-/// How many products of a degree there are of the regressors of a plan.
-fn products(plan: &NonlinearArxPlan, degree: usize) -> Result<usize, Error> {
-    let inputs = plan.input_lags.iter().map(|input| input.lags);
-    let expressions = plan.read_expressions()?;
-    let expressions = expressions.iter().map(|expression| plan.lags_of(expression).len());
-    let regressors = plan.output_lags.iter().copied().chain(inputs).chain(expressions).sum();
-    Ok(Monomials::new(regressors, degree).map_or(usize::MAX, |all| all.count()))
-}
-
 /// The plan with its lags, and where lags are chosen with those of the linear model too: as many past outputs as A or F reads, and of each
 /// input those of B and the one before them, as a nonlinear plant may answer sooner.
 fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan> {
@@ -188,7 +248,7 @@ fn linear_plan(plan: &NonlinearArxPlan) -> Plan {
         split: plan.split,
         detrend: plan.detrend,
         offsets: plan.offsets.clone(),
-        ..Plan::new(&inputs, output, Choice::Automatic(Automatic::default()))
+        ..Plan::new(&inputs, output, Choice::Automatic(Automatic { linear: true, ..Automatic::default() }))
     }
 }
 

@@ -14,10 +14,12 @@ use super::spreadsheet::{self, Sheet};
 use super::stream::TextStream;
 use super::time::Calendar;
 use super::zone::Zone;
-use super::{ClockColumns, Options, Selection, Table};
+use super::{ClockColumns, Options, Selection, Table, Topic};
 
 #[cfg(feature = "columnar")]
 use super::columnar::{ColumnarReader, ColumnarStream};
+#[cfg(feature = "flight-logs")]
+use super::topics::{TopicStream, TopicsReader};
 
 /// A log whose columns are known and whose rows are still to be read.
 pub struct Reader {
@@ -32,6 +34,8 @@ pub(super) enum AnyReader {
     Text(Box<TextReader>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarReader>),
+    #[cfg(feature = "flight-logs")]
+    Topics(Box<TopicsReader>),
 }
 
 impl Reader {
@@ -73,12 +77,16 @@ impl Reader {
             Some(Format::Columnar(format)) => {
                 Ok(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?)))
             }
-            #[cfg(not(all(feature = "columnar", feature = "spreadsheets")))]
+            #[cfg(feature = "flight-logs")]
+            Some(Format::Topical(format)) => {
+                Ok(AnyReader::Topics(Box::new(TopicsReader::open(bytes, format, options)?)))
+            }
+            #[cfg(not(all(feature = "columnar", feature = "flight-logs", feature = "spreadsheets")))]
             Some(_) => Err(Error::data(
                 bytes.name(),
                 None,
-                "is in a format that this program was built without; build it with the features columnar and spreadsheets, or \
-                 write CSV",
+                "is in a format that this program was built without; build it with the features columnar, flight-logs and \
+                 spreadsheets, or write CSV",
             )),
         };
         Ok(Self { any: any?, file, zone })
@@ -96,6 +104,26 @@ impl Reader {
             AnyReader::Text(reader) => reader.names(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.names(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.names(),
+        }
+    }
+
+    /// The topics of a log of which each topic has a clock of its own; none of any other log.
+    pub fn topics(&self) -> Option<&[Topic]> {
+        match &self.any {
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => Some(reader.topics()),
+            _ => None,
+        }
+    }
+
+    /// What is not as it should be with the topics of a log, and what of it is not read, in plain words.
+    pub fn remarks(&self) -> Vec<String> {
+        match &self.any {
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.remarks(),
+            _ => Vec::new(),
         }
     }
 
@@ -106,6 +134,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.words(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.words(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => vec![false; reader.names().len()],
         }
     }
 
@@ -115,6 +145,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.nameless().collect(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(_) => Vec::new(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -126,6 +158,8 @@ impl Reader {
             AnyReader::Columnar(reader) => {
                 reader.times().into_iter().map(|time| ClockColumns { time, date: None }).collect()
             }
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -135,6 +169,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.called_clocks(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(_) => Vec::new(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -181,6 +217,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.read_parts(selection, most, progress, &mut take),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.read_parts(selection, most, progress, &mut take),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.read_parts(selection, most, progress, &mut take),
         };
         read.and(failed.map_or(Ok(()), Err))
     }
@@ -202,6 +240,8 @@ impl Reader {
             AnyReader::Columnar(reader) => {
                 Ok(Stream(AnyStream::Columnar(Box::new(reader.stream(selection, start)?))))
             }
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => Ok(Stream(AnyStream::Topics(Box::new(reader.stream(selection)?)))),
         }
     }
 }
@@ -213,6 +253,8 @@ enum AnyStream {
     Text(Box<TextStream>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarStream>),
+    #[cfg(feature = "flight-logs")]
+    Topics(Box<TopicStream>),
 }
 
 impl Stream {
@@ -222,6 +264,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.waker(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.waker(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.waker(),
         }
     }
 
@@ -231,6 +275,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.start(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.start(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => None,
         }
     }
 
@@ -240,6 +286,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.values(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.values(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.values(),
         }
     }
 
@@ -249,6 +297,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.time(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.time(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.time(),
         }
     }
 
@@ -258,6 +308,8 @@ impl Stream {
             AnyStream::Text(stream) => format!("{file}:{}", stream.line()),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => format!("{file}: row {}", stream.row()),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => format!("{file}: row {}", stream.row()),
         }
     }
 
@@ -267,6 +319,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.is_unfinished(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(_) => false,
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => false,
         }
     }
 
@@ -276,6 +330,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.words(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.words(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.words(),
         }
     }
 
@@ -288,6 +344,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.next(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.next(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.next(),
         }
     }
 }

@@ -145,6 +145,7 @@ impl Plan {
             }),
             start,
             calendar: Calendar::None,
+            clocks: Vec::new(),
             rows: rows.count,
             lines: rows.lines,
             words: Vec::new(),

@@ -1,0 +1,649 @@
+//! Flight and robot logs: topics, each with a clock and fields of its own.
+//!
+//! The file is held in memory, unpacked, and walked twice: once for what there is, and once for the values of the columns that were
+//! selected. A message is a few bytes at a known place, so a field is an offset and a type, in all formats.
+//!
+//! Power is cut in the middle of a message, cards lose blocks: what can be read is read, and what is not is told. Nothing is reserved
+//! for what a file states, only for what stands in it.
+
+mod dataflash;
+mod number;
+#[cfg(test)]
+mod tests;
+mod ulog;
+mod wpilog;
+
+use std::collections::HashMap;
+use std::io::{self, Read};
+use std::ops::{ControlFlow, Range};
+use std::thread;
+
+use super::error::{Error, escaped, shortened};
+use super::mailbox::{Event, Mailbox, Message, Waker};
+use super::source::{Bytes, Topical};
+use super::{Options, OwnClock, Selection, Table, Topic};
+use number::Number;
+
+/// What is read of a file at once.
+const PIECE: usize = 1 << 20;
+/// A log has no more columns than this, and no longer names: a damaged file must not ask for more memory than there is.
+const MOST_COLUMNS: usize = 1 << 18;
+const LONGEST_NAME: usize = 512;
+/// A row of a stream for each of these is handed on at once.
+const ROWS_OF_A_PIECE: usize = 1 << 10;
+/// This many names are told.
+const MOST_TOLD: usize = 6;
+
+/// A number in the messages of a topic.
+#[derive(Clone, Debug, PartialEq)]
+struct Field {
+    /// The column's name.
+    name: String,
+    /// Where it stands in a message.
+    at: usize,
+    number: Number,
+    /// What it is divided by.
+    divisor: f64,
+}
+
+/// A topic as a decoder finds it.
+#[derive(Clone, Debug)]
+struct FoundTopic {
+    name: String,
+    fields: Vec<Field>,
+    rows: usize,
+    first: f64,
+    last: f64,
+}
+
+/// What a decoder finds in a log.
+struct Found<'t> {
+    topics: Vec<FoundTopic>,
+    places: HashMap<String, usize>,
+    columns: usize,
+    /// What is not read, and why.
+    left_out: Vec<String>,
+    damage: Damage,
+    /// Takes each message: its topic, its time in seconds and its bytes.
+    take: &'t mut dyn FnMut(usize, f64, &[u8]),
+}
+
+/// What of a log cannot be read.
+#[derive(Default)]
+struct Damage {
+    /// Bytes that are no message, and in how many places.
+    bytes: usize,
+    places: usize,
+    /// Whether the log ends in the middle of a message.
+    is_unfinished: bool,
+    /// Messages that are not as they were declared.
+    messages: usize,
+    /// What the recorder says that it did not write: how often, and seconds.
+    dropouts: usize,
+    dropped: f64,
+}
+
+impl<'t> Found<'t> {
+    fn new(take: &'t mut dyn FnMut(usize, f64, &[u8])) -> Self {
+        Self {
+            topics: Vec::new(),
+            places: HashMap::new(),
+            columns: 0,
+            left_out: Vec::new(),
+            damage: Damage::default(),
+            take,
+        }
+    }
+
+    /// A topic with these fields, the one that is there or a new one. None if another of this name has other fields.
+    ///
+    /// # Errors
+    /// That there are more columns than a log has.
+    fn topic(&mut self, name: &str, fields: Vec<Field>) -> Result<Option<usize>, String> {
+        if let Some(&known) = self.places.get(name) {
+            return Ok(self.topics.get(known).is_some_and(|topic| topic.fields == fields).then_some(known));
+        }
+        self.more(fields.len())?;
+        self.places.insert(name.to_owned(), self.topics.len());
+        self.topics.push(FoundTopic { name: name.to_owned(), fields, rows: 0, first: 0.0, last: 0.0 });
+        Ok(Some(self.topics.len() - 1))
+    }
+
+    /// That there are so many columns more.
+    fn more(&mut self, columns: usize) -> Result<(), String> {
+        self.columns += columns;
+        match self.columns > MOST_COLUMNS {
+            true => Err(format!(
+                "it has more than {MOST_COLUMNS} columns, as no log of this kind has: it is damaged; copy it again from \
+                 the device"
+            )),
+            false => Ok(()),
+        }
+    }
+
+    fn message(&mut self, topic: usize, time: f64, data: &[u8]) {
+        let Some(found) = self.topics.get_mut(topic) else { return };
+        if found.rows == 0 {
+            (found.first, found.last) = (time, time);
+        }
+        (found.first, found.last) = (found.first.min(time), found.last.max(time));
+        found.rows += 1;
+        (self.take)(topic, time, data);
+    }
+}
+
+impl Damage {
+    /// So many bytes are no message.
+    fn skip(&mut self, bytes: usize) {
+        self.bytes += bytes;
+        self.places += 1;
+    }
+
+    fn words(&self, file: &str) -> Vec<String> {
+        let mut words = Vec::new();
+        if self.is_unfinished {
+            words.push(format!(
+                "{file}: the log ends in the middle of a message, as where power was cut: it is read up to there"
+            ));
+        }
+        if self.bytes > 0 {
+            let places = if self.places == 1 { "place" } else { "places" };
+            words.push(format!(
+                "{file}: {} bytes in {} {places} are no messages, as in a file that is damaged: they are left out",
+                self.bytes, self.places
+            ));
+        }
+        if self.messages > 0 {
+            words.push(format!(
+                "{file}: {} messages are not as they were declared, and are left out",
+                self.messages
+            ));
+        }
+        if self.dropouts > 0 {
+            words.push(format!(
+                "{file}: the recorder was too slow {} times, and left out {:.3} s in all",
+                self.dropouts, self.dropped
+            ));
+        }
+        words
+    }
+}
+
+/// Walks through a log.
+///
+/// # Errors
+/// That the file is no such log, or is one that cannot be understood.
+fn decode(format: Topical, bytes: &[u8], found: &mut Found<'_>) -> Result<(), String> {
+    match format {
+        Topical::Ulog => ulog::decode(bytes, found),
+        Topical::DataFlash => dataflash::decode(bytes, found),
+        Topical::WpiLog => wpilog::decode(bytes, found),
+    }
+}
+
+/// A log of topics, of which is known what there is, and of which the values are still to be read.
+pub(super) struct TopicsReader {
+    file: String,
+    format: Topical,
+    bytes: Vec<u8>,
+    /// How many bytes the file has.
+    size: u64,
+    options: Options,
+    topics: Vec<FoundTopic>,
+    /// The same for who asks.
+    shown: Vec<Topic>,
+    names: Vec<String>,
+    /// Which topic a column is of, and which of its fields.
+    places: Vec<(usize, usize)>,
+    damage: Vec<String>,
+    left_out: Vec<String>,
+}
+
+impl TopicsReader {
+    /// Reads what topics there are.
+    pub(super) fn open(bytes: Bytes, format: Topical, options: &Options) -> Result<Self, Error> {
+        let file = bytes.name().to_owned();
+        let bad = |message: String| Error::data(&file, None, message);
+        if let Some(option) = options.of_texts() {
+            let this = format.said();
+            return Err(bad(format!(
+                "{option} says how a text is written, and this is {this}; leave it out"
+            )));
+        }
+        for (option, given) in [
+            ("`time-format`", options.time_format.is_some()),
+            ("`time-unit`", options.time_unit.is_some()),
+            ("`time-zone`", options.time_zone.is_some()),
+        ] {
+            if given {
+                let this = format.said();
+                return Err(bad(format!(
+                    "{option} says how times are written, and {this} says that itself; leave it out"
+                )));
+            }
+        }
+        let bytes = held(bytes, &file, options)?;
+        let mut nothing = |_: usize, _: f64, _: &[u8]| {};
+        let mut found = Found::new(&mut nothing);
+        decode(format, &bytes, &mut found).map_err(bad)?;
+        let Found { mut topics, left_out, damage, .. } = found;
+        let empty = topics.iter().all(|topic| topic.rows == 0 || topic.fields.is_empty());
+        let damage = damage.words(&escaped(&file));
+        if empty {
+            let why = damage.first().map_or("it may have ended before the first one", |_| "it is damaged");
+            return Err(bad(format!(
+                "there is no message with numbers and a time: {why}; copy it again from the device"
+            )));
+        }
+        // Places stay: a second walk counts alike.
+        for topic in &mut topics {
+            if topic.rows == 0 {
+                topic.fields.clear();
+            }
+        }
+        let (mut shown, mut names, mut places) = (Vec::new(), Vec::new(), Vec::new());
+        for (place, topic) in topics.iter().enumerate().filter(|(_, topic)| !topic.fields.is_empty()) {
+            let first = names.len();
+            names.extend(topic.fields.iter().map(|field| field.name.clone()));
+            places.extend((0..topic.fields.len()).map(|field| (place, field)));
+            shown.push(Topic {
+                name: topic.name.clone(),
+                rows: topic.rows,
+                duration: topic.last - topic.first,
+                columns: first..names.len(),
+            });
+        }
+        let size = bytes.len() as u64;
+        Ok(Self {
+            file,
+            format,
+            bytes,
+            size,
+            options: options.clone(),
+            topics,
+            shown,
+            names,
+            places,
+            damage,
+            left_out,
+        })
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    pub(super) fn topics(&self) -> &[Topic] {
+        &self.shown
+    }
+
+    /// What a list of the topics should say besides, in plain words.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let file = escaped(&self.file);
+        let left_out = self.left_out.iter().map(|words| format!("{file}: {words}"));
+        self.damage.iter().cloned().chain(left_out).collect()
+    }
+
+    /// Reads the selected columns; see [`Reader::read_parts`](super::Reader::read_parts).
+    pub(super) fn read_parts(
+        self,
+        selection: &Selection,
+        most: Option<usize>,
+        progress: &mut dyn FnMut(u64, Option<u64>),
+        take: &mut dyn FnMut(Table) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        let size = self.size;
+        let table = match most {
+            Some(_) => self.one_topic(selection)?,
+            None => self.table(selection)?,
+        };
+        progress(size, Some(size));
+        let most = most.unwrap_or(usize::MAX).max(1);
+        if table.rows <= most {
+            let _ = take(table);
+            return Ok(());
+        }
+        let mut first = 0;
+        while first < table.rows {
+            // What is left and would be short belongs to the part before it.
+            let end = if table.rows - first < 2 * most { table.rows } else { first + most };
+            let part = |values: &Vec<f64>| values.get(first..end).unwrap_or_default().to_vec();
+            let words = if first == 0 { table.words.clone() } else { Vec::new() };
+            let part = Table {
+                columns: table.columns.iter().map(part).collect(),
+                time: table.time.as_ref().map(part),
+                rows: end - first,
+                words,
+                ..Table::default()
+            };
+            if take(part).is_break() {
+                break;
+            }
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// Gives the rows one by one; see [`Reader::stream`](super::Reader::stream).
+    pub(super) fn stream(self, selection: &Selection) -> Result<TopicStream, Error> {
+        let file = self.file.clone();
+        let mut table = self.one_topic(selection)?;
+        let stream = TopicStream {
+            values: vec![0.0; selection.columns.len()],
+            words: std::mem::take(&mut table.words),
+            part: Part::default(),
+            next: 0,
+            row: 0,
+            ended: false,
+            mailbox: Mailbox::new(),
+        };
+        let sender = stream.mailbox.sender();
+        let send = move || {
+            for first in (0..table.rows).step_by(ROWS_OF_A_PIECE) {
+                let rows = first..table.rows.min(first + ROWS_OF_A_PIECE);
+                if sender.send(Message::Piece(Part::of(&table, rows))).is_err() {
+                    return;
+                }
+            }
+            drop(sender.send(Message::End));
+        };
+        let begun = thread::Builder::new().spawn(send);
+        begun.map_err(|error| Error::no_thread(&file, &error))?;
+        Ok(stream)
+    }
+
+    /// The selected columns, if all are of one topic.
+    fn one_topic(self, selection: &Selection) -> Result<Table, Error> {
+        let file = self.file.clone();
+        let table = self.table(selection)?;
+        match table.clocks.as_slice() {
+            [] => Ok(table),
+            clocks => {
+                let names: Vec<&str> = clocks.iter().map(|clock| clock.topic.as_str()).collect();
+                Err(Error::data(
+                    &file,
+                    None,
+                    format!(
+                        "the columns are of several topics ({}), each with a clock of its own, and are put on one clock only \
+                         where the log is read whole; name columns of one topic",
+                        listed(&names)
+                    ),
+                ))
+            }
+        }
+    }
+
+    /// The selected columns.
+    fn table(self, selection: &Selection) -> Result<Table, Error> {
+        let bad = |message: String| Error::data(&self.file, None, message);
+        if selection.time.is_some() || selection.date.is_some() {
+            return Err(bad("each topic has a clock of its own; leave `time` out".to_owned()));
+        }
+        let mut wanted: Vec<Wanted<'_>> = Vec::new();
+        let mut twice = vec![false; self.places.len()];
+        for (place, &column) in selection.columns.iter().enumerate() {
+            let found = self.places.get(column).and_then(|&(topic, field)| {
+                let found = self.topics.get(topic)?;
+                Some((topic, found, found.fields.get(field)?))
+            });
+            let Some((topic, found, field)) = found else {
+                let all = self.names.len();
+                return Err(bad(format!("there is no column {}; select from the first {all}", column + 1)));
+            };
+            if twice.get_mut(column).is_some_and(|twice| std::mem::replace(twice, true)) {
+                let name = escaped(&shortened(&field.name));
+                return Err(bad(format!("column '{name}' is selected twice; select it once")));
+            }
+            let own = match wanted.iter().position(|wanted| wanted.topic == topic) {
+                Some(own) => own,
+                None => {
+                    wanted.push(Wanted { topic, name: &found.name, time: Vec::new(), columns: Vec::new() });
+                    wanted.len() - 1
+                }
+            };
+            if let Some(wanted) = wanted.get_mut(own) {
+                wanted.columns.push(Column { place, field, values: Vec::new(), infinite: 0, rounded: 0 });
+            }
+        }
+        let rows = |topic: usize| self.topics.get(topic).map_or(0, |topic| topic.rows);
+        let values = wanted.iter().map(|wanted| rows(wanted.topic).saturating_mul(wanted.columns.len() + 1));
+        let values = values.fold(0, usize::saturating_add);
+        if let Some(words) = self.options.bound.and_then(|bound| bound.passed_by(values)) {
+            return Err(Error::memory(&self.file, None, &words));
+        }
+        for wanted in &mut wanted {
+            let rows = rows(wanted.topic);
+            let columns = wanted.columns.iter_mut().map(|column| &mut column.values);
+            for values in columns.chain([&mut wanted.time]) {
+                let reserved = values.try_reserve_exact(rows);
+                reserved.map_err(|error| Error::memory(&self.file, None, &error.to_string()))?;
+            }
+        }
+        let place = |topic: usize| wanted.iter().position(|wanted| wanted.topic == topic);
+        let places: Vec<Option<usize>> = (0..self.topics.len()).map(place).collect();
+        let mut take = |topic: usize, time: f64, data: &[u8]| {
+            let place = places.get(topic).copied().flatten();
+            if let Some(wanted) = place.and_then(|place| wanted.get_mut(place)) {
+                wanted.add(time, data);
+            }
+        };
+        let mut found = Found::new(&mut take);
+        decode(self.format, &self.bytes, &mut found).map_err(bad)?;
+        let file = escaped(&self.file);
+        let mut words = self.damage.clone();
+        wanted.iter_mut().for_each(|wanted| wanted.sort(&file, &mut words));
+        Ok(joined(wanted, selection.columns.len(), words))
+    }
+}
+
+/// The columns of all topics, each at its place.
+fn joined(mut wanted: Vec<Wanted<'_>>, columns: usize, words: Vec<String>) -> Table {
+    let mut table = Table { columns: vec![Vec::new(); columns], words, ..Table::default() };
+    table.rows = wanted.iter().map(|wanted| wanted.time.len()).max().unwrap_or(0);
+    for column in wanted.iter_mut().flat_map(|wanted| &mut wanted.columns) {
+        if let Some(place) = table.columns.get_mut(column.place) {
+            *place = std::mem::take(&mut column.values);
+        }
+    }
+    match wanted.as_mut_slice() {
+        [one] => table.time = Some(std::mem::take(&mut one.time)),
+        several => {
+            table.clocks = several
+                .iter_mut()
+                .map(|wanted| OwnClock {
+                    topic: wanted.name.to_owned(),
+                    time: std::mem::take(&mut wanted.time),
+                    columns: wanted.columns.iter().map(|column| column.place).collect(),
+                })
+                .collect();
+        }
+    }
+    table
+}
+
+/// The columns of a topic that are read.
+struct Wanted<'t> {
+    topic: usize,
+    name: &'t str,
+    time: Vec<f64>,
+    columns: Vec<Column<'t>>,
+}
+
+struct Column<'t> {
+    /// Its place among those that were selected.
+    place: usize,
+    field: &'t Field,
+    values: Vec<f64>,
+    /// How many values were infinite, and beyond what 64 bits of floating point hold.
+    infinite: usize,
+    rounded: usize,
+}
+
+impl Wanted<'_> {
+    fn add(&mut self, time: f64, data: &[u8]) {
+        /// Whole numbers up to here are what they are.
+        const EXACT: f64 = (1_u64 << 53) as f64;
+        self.time.push(time);
+        for column in &mut self.columns {
+            let Field { at, number, divisor, .. } = *column.field;
+            let mut value = number.read(data, at).map_or(f64::NAN, |value| value / divisor);
+            if value.is_infinite() {
+                value = f64::NAN;
+                column.infinite += 1;
+            }
+            column.rounded += usize::from(number.is_long() && value.abs() > EXACT);
+            column.values.push(value);
+        }
+    }
+
+    /// Puts the rows in the order of their times, of which each stands once, and says what was done.
+    fn sort(&mut self, file: &str, words: &mut Vec<String>) {
+        let name = escaped(&shortened(self.name));
+        let back = self.time.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        if back > 0 {
+            let mut order: Vec<usize> = (0..self.time.len()).collect();
+            let time = &self.time;
+            order.sort_by(|a, b| time[*a].total_cmp(&time[*b]));
+            let sorted = |values: &Vec<f64>| order.iter().map(|&row| values[row]).collect::<Vec<f64>>();
+            for column in &mut self.columns {
+                column.values = sorted(&column.values);
+            }
+            self.time = sorted(&self.time);
+            words
+                .push(format!("{file}: the times of '{name}' go back in {back} places: its rows are sorted"));
+        }
+        let repeated = self.time.windows(2).filter(|pair| pair[1] == pair[0]).count();
+        if repeated > 0 {
+            let last: Vec<bool> = (0..self.time.len())
+                .map(|row| self.time.get(row + 1).is_none_or(|next| *next != self.time[row]))
+                .collect();
+            let columns = self.columns.iter_mut().map(|column| &mut column.values);
+            for values in columns.chain([&mut self.time]) {
+                let mut is_last = last.iter().copied();
+                values.retain(|_| is_last.next().unwrap_or(true));
+            }
+            words.push(format!(
+                "{file}: '{name}' has {repeated} rows with the time of the one that follows: they are left out"
+            ));
+        }
+        for column in &self.columns {
+            let name = escaped(&shortened(&column.field.name));
+            if column.infinite > 0 {
+                let count = column.infinite;
+                words.push(format!(
+                    "{file}: column '{name}' has {count} infinite values, which count as missing"
+                ));
+            }
+            if column.rounded > 0 {
+                words.push(format!(
+                    "{file}: column '{name}' has whole numbers beyond 2^53, which are rounded to the nearest ones that 64 \
+                     bits of floating point hold"
+                ));
+            }
+        }
+    }
+}
+
+/// The whole file, if there is memory for it.
+fn held(bytes: Bytes, file: &str, options: &Options) -> Result<Vec<u8>, Error> {
+    let gzip = bytes.is_gzip();
+    let (mut reader, mut held, mut piece) = (bytes.into_reader(), Vec::new(), vec![0; PIECE]);
+    loop {
+        let count = match reader.read(&mut piece) {
+            Ok(0) => return Ok(held),
+            Ok(count) => count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
+            // A stream that ends too early is a log whose end is missing.
+            Err(error) if gzip && error.kind() == io::ErrorKind::UnexpectedEof && !held.is_empty() => {
+                return Ok(held);
+            }
+            Err(error) => return Err(Error::io(file, format!("cannot be read: {error}"))),
+        };
+        let words = options.bound.and_then(|bound| bound.passed_by_file((held.len() + count) as u64));
+        let words = words.or_else(|| held.try_reserve(count).err().map(|error| error.to_string()));
+        if let Some(words) = words {
+            return Err(Error::memory(file, None, &words));
+        }
+        held.extend_from_slice(&piece[..count]);
+    }
+}
+
+/// Names as a message lists them, not all of very many.
+fn listed(names: &[&str]) -> String {
+    let first: Vec<String> = names.iter().take(MOST_TOLD).map(|name| escaped(&shortened(name))).collect();
+    let more = names.len().saturating_sub(MOST_TOLD);
+    if more > 0 { format!("{} and {more} more", first.join(", ")) } else { first.join(", ") }
+}
+
+/// Some rows, one after the other.
+#[derive(Default)]
+struct Part {
+    columns: Vec<Vec<f64>>,
+    time: Vec<f64>,
+}
+
+impl Part {
+    fn of(table: &Table, rows: Range<usize>) -> Self {
+        let part = |values: &Vec<f64>| values.get(rows.clone()).unwrap_or_default().to_vec();
+        Self {
+            columns: table.columns.iter().map(part).collect(),
+            time: table.time.as_ref().map(part).unwrap_or_default(),
+        }
+    }
+}
+
+/// The rows of a topic, one after the other.
+pub(super) struct TopicStream {
+    values: Vec<f64>,
+    words: Vec<String>,
+    part: Part,
+    next: usize,
+    /// The number of the row at hand, counted from one.
+    row: u64,
+    ended: bool,
+    mailbox: Mailbox<Part>,
+}
+
+impl TopicStream {
+    pub(super) fn waker(&self) -> Waker {
+        self.mailbox.waker()
+    }
+
+    pub(super) fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    pub(super) fn time(&self) -> Option<f64> {
+        self.part.time.get(self.next.checked_sub(1)?).copied()
+    }
+
+    pub(super) fn row(&self) -> u64 {
+        self.row
+    }
+
+    pub(super) fn words(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.words)
+    }
+
+    pub(super) fn next(&mut self) -> Result<Event, Error> {
+        while self.next >= self.part.time.len() {
+            if self.ended {
+                return Ok(Event::End);
+            }
+            match self.mailbox.take() {
+                None => return Ok(Event::Idle),
+                Some(Message::Failed(error)) => return Err(error),
+                Some(Message::Stop) => return Ok(Event::Stopped),
+                Some(Message::End) => self.ended = true,
+                Some(Message::Piece(part)) => (self.part, self.next) = (part, 0),
+            }
+        }
+        self.mailbox.forget();
+        for (value, column) in self.values.iter_mut().zip(&self.part.columns) {
+            *value = column.get(self.next).copied().unwrap_or(f64::NAN);
+        }
+        self.next += 1;
+        self.row += 1;
+        Ok(Event::Row)
+    }
+}

@@ -25,6 +25,8 @@ mod equations;
 mod export;
 mod filter;
 mod fit_reference;
+#[cfg(feature = "flight-logs")]
+mod flight_logs;
 mod floors;
 mod focus;
 mod forecast;

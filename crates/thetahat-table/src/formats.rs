@@ -1,12 +1,16 @@
 //! Logs of all formats, behind one front.
 
-#[cfg(feature = "spreadsheets")]
+#[cfg(any(feature = "matlab", feature = "spreadsheets"))]
 use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::path::Path;
 
+#[cfg(feature = "matlab")]
+use super::Header;
 use super::error::Error;
 use super::mailbox::{Event, Waker};
+#[cfg(feature = "matlab")]
+use super::matlab::{self, Variables};
 use super::reader::{SIZES, TextReader};
 use super::source::{Bytes, Format, Source};
 #[cfg(feature = "spreadsheets")]
@@ -41,19 +45,19 @@ pub(super) enum AnyReader {
 impl Reader {
     /// Opens a log, or standard input for `-`, and reads as far as its first row.
     pub fn open(path: &Path, options: &Options) -> Result<Self, Error> {
-        Self::begin(path, options, |source| TextReader::start(source, options, SIZES))
+        Self::begin(path, options, |source, options| TextReader::start(source, options, SIZES))
     }
 
     /// Opens a log as [`open`](Reader::open) does, without asking for more than it takes to know its columns: it may be
     /// a pipe on which the next row is yet to come. For [`stream`](Reader::stream).
     pub fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
-        Self::begin(path, options, |source| TextReader::start_live(source, options))
+        Self::begin(path, options, TextReader::start_live)
     }
 
     fn begin(
         path: &Path,
         options: &Options,
-        text: impl FnOnce(Source) -> Result<TextReader, Error>,
+        text: impl FnOnce(Source, &Options) -> Result<TextReader, Error>,
     ) -> Result<Self, Error> {
         options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
         let bytes = Bytes::open(path)?;
@@ -65,27 +69,44 @@ impl Reader {
                 let Sheet { text: cells, words } = spreadsheet::read(bytes, options)?;
                 let total = Some(cells.len() as u64);
                 let cells = Bytes::new(&file, Cursor::new(cells), total)?;
-                let mut reader = text(Source::new(cells, None))?;
+                let mut reader = text(Source::new(cells, None), options)?;
                 reader.tell(&words);
                 Ok(AnyReader::Text(Box::new(reader)))
             }
             _ if options.sheet.is_some() => {
                 Err(Error::data(&file, None, "`sheet` is for spreadsheets, and this is none; leave it out"))
             }
-            None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?))),
+            None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding), options)?))),
             #[cfg(feature = "columnar")]
             Some(Format::Columnar(format)) => {
                 Ok(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?)))
+            }
+            #[cfg(feature = "matlab")]
+            Some(Format::Matlab) => {
+                let Variables { text: rows, words } = matlab::read(bytes, options)?;
+                let total = Some(rows.len() as u64);
+                let rows = Bytes::new(&file, Cursor::new(rows), total)?;
+                // How it is written is known.
+                let (header, delimiter, decimal_comma) = (Header::Line(1), Some(b'\t'), Some(false));
+                let options = Options { header, delimiter, decimal_comma, ..options.clone() };
+                let mut reader = text(Source::new(rows, None), &options)?;
+                reader.tell(&words);
+                Ok(AnyReader::Text(Box::new(reader)))
             }
             #[cfg(feature = "flight-logs")]
             Some(Format::Topical(format)) => {
                 Ok(AnyReader::Topics(Box::new(TopicsReader::open(bytes, format, options)?)))
             }
-            #[cfg(not(all(feature = "columnar", feature = "flight-logs", feature = "spreadsheets")))]
+            #[cfg(not(all(
+                feature = "columnar",
+                feature = "flight-logs",
+                feature = "matlab",
+                feature = "spreadsheets"
+            )))]
             Some(_) => Err(Error::data(
                 bytes.name(),
                 None,
-                "is in a format that this program was built without; build it with the features columnar, flight-logs and \
+                "is in a format that this program was built without; build it with the features columnar, flight-logs, matlab and \
                  spreadsheets, or write CSV",
             )),
         };
@@ -277,6 +298,15 @@ impl Stream {
             AnyStream::Columnar(stream) => stream.start(),
             #[cfg(feature = "flight-logs")]
             AnyStream::Topics(_) => None,
+        }
+    }
+
+    /// Whether its rows are those of a topic, which have a time each, also where none is selected.
+    pub fn is_of_a_topic(&self) -> bool {
+        match &self.0 {
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => true,
+            _ => false,
         }
     }
 

@@ -1,4 +1,4 @@
-//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, Parquet, and Arrow IPC files and streams; and logs of
+//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files and streams; and logs of
 //! flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash (ArduPilot) and WPILib data logs.
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
@@ -54,6 +54,8 @@ mod formats;
 mod layout;
 mod lines;
 mod mailbox;
+#[cfg(feature = "matlab")]
+mod matlab;
 mod memory;
 mod names;
 mod names_of_times;
@@ -155,7 +157,7 @@ impl Options {
     }
 
     /// The option of texts that was given, if there is one.
-    #[cfg(any(feature = "columnar", feature = "flight-logs"))]
+    #[cfg(any(feature = "columnar", feature = "flight-logs", feature = "matlab"))]
     fn of_texts(&self) -> Option<&'static str> {
         let given = [
             ("`delimiter`", self.delimiter.is_some()),

@@ -43,7 +43,7 @@ impl Bound {
     }
 
     /// What a file of this many bytes takes that is held while it is read, in words, if it is more than there is.
-    #[cfg(feature = "flight-logs")]
+    #[cfg(any(feature = "flight-logs", feature = "matlab"))]
     pub(crate) fn passed_by_file(&self, bytes: u64) -> Option<String> {
         let free = self.free.filter(|free| bytes > *free)?;
         Some(format!("the file has more than {} unpacked, and {} are free", said(bytes), said(free)))

@@ -147,22 +147,23 @@ impl Damage {
             ));
         }
         if self.bytes > 0 {
-            let places = if self.places == 1 { "place" } else { "places" };
+            let places = counted(self.places, "place", "places");
             words.push(format!(
-                "{file}: {} bytes in {} {places} are no messages, as in a file that is damaged: they are left out",
-                self.bytes, self.places
+                "{file}: {} bytes in {places} are no messages, as in a file that is damaged: they are left out",
+                self.bytes
             ));
         }
         if self.messages > 0 {
             words.push(format!(
-                "{file}: {} messages are not as they were declared, and are left out",
-                self.messages
+                "{file}: {} not as declared, and left out",
+                counted(self.messages, "message is", "messages are")
             ));
         }
         if self.dropouts > 0 {
+            let times = counted(self.dropouts, "time", "times");
             words.push(format!(
-                "{file}: the recorder was too slow {} times, and left out {:.3} s in all",
-                self.dropouts, self.dropped
+                "{file}: the recorder was too slow {times}, and left out {:.3} s in all",
+                self.dropped
             ));
         }
         words
@@ -394,6 +395,13 @@ impl TopicsReader {
                 let name = escaped(&shortened(&field.name));
                 return Err(bad(format!("column '{name}' is selected twice; select it once")));
             }
+            if found.rows > 1 && found.first == found.last {
+                let topic = escaped(&shortened(&found.name));
+                return Err(bad(format!(
+                    "the messages of '{topic}' all have the same time, {} s: it has no clock; name columns of another topic",
+                    found.first
+                )));
+            }
             let own = match wanted.iter().position(|wanted| wanted.topic == topic) {
                 Some(own) => own,
                 None => {
@@ -523,16 +531,16 @@ impl Wanted<'_> {
                 values.retain(|_| is_last.next().unwrap_or(true));
             }
             words.push(format!(
-                "{file}: '{name}' has {repeated} rows with the time of the one that follows: they are left out"
+                "{file}: '{name}' has {} with the time of the one that follows: left out",
+                counted(repeated, "row", "rows")
             ));
         }
         for column in &self.columns {
             let name = escaped(&shortened(&column.field.name));
             if column.infinite > 0 {
-                let count = column.infinite;
-                words.push(format!(
-                    "{file}: column '{name}' has {count} infinite values, which count as missing"
-                ));
+                let count =
+                    counted(column.infinite, "infinite value, which counts", "infinite values, which count");
+                words.push(format!("{file}: column '{name}' has {count} as missing"));
             }
             if column.rounded > 0 {
                 words.push(format!(
@@ -566,6 +574,11 @@ fn held(bytes: Bytes, file: &str, options: &Options) -> Result<Vec<u8>, Error> {
         }
         held.extend_from_slice(&piece[..count]);
     }
+}
+
+/// So many of something.
+fn counted(count: usize, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
 }
 
 /// Names as a message lists them, not all of very many.

@@ -5,6 +5,7 @@
 //! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
 //!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output
 //!   ([`Feedback`]).
+//! - A [`TopicList`] says what there is in a log of topics that have clocks of their own.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log, Rows, Source};
@@ -37,6 +38,7 @@ mod saturation;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod topics;
 mod warnings;
 mod whitening;
 
@@ -48,4 +50,5 @@ pub use pieces::PiecewiseInspection;
 pub use plan::InspectionPlan;
 pub(crate) use quantization::quantization;
 pub use run::{inspect, inspect_log};
+pub use topics::{TopicList, TopicSummary};
 pub(crate) use whitening::autoregression;

@@ -76,16 +76,13 @@ pub(super) fn decode(bytes: &[u8], found: &mut Found<'_>) -> Result<(), String> 
         }
     }
     for (names, what) in [
-        (
-            structures,
-            "hold structures, of which no numbers are read, and are left out (record their numbers as entries)",
-        ),
-        (left_out, "hold no numbers, or others than before, and are left out"),
-        (long, "are arrays of more than 256 numbers, of which the first 256 are read"),
+        (structures, "entries of structures are left out (record their numbers as entries of their own)"),
+        (left_out, "entries without numbers, or with others than before, are left out"),
+        (long, "of arrays of more than 256 numbers the first 256 are read"),
     ] {
         if !names.is_empty() {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
-            found.left_out.push(format!("{} of the entries {what}: {}", names.len(), listed(&names)));
+            found.left_out.push(format!("{what}: {}", listed(&names)));
         }
     }
     Ok(())

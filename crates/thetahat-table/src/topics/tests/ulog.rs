@@ -105,7 +105,7 @@ fn formats_stand_in_one_another() {
     assert!(values[4].is_nan() && values[5] == 1.0);
     let words = table.words.join("\n");
     assert!(
-        words.contains("'esc_status#3.esc[1].rpm' has 1 infinite values, which count as missing"),
+        words.contains("'esc_status#3.esc[1].rpm' has 1 infinite value, which counts as missing"),
         "{words}"
     );
     assert!(words.contains("'esc_status#3.esc[1].timestamp' has whole numbers beyond 2^53"), "{words}");
@@ -158,8 +158,8 @@ fn what_was_lost_is_told() {
         [
             "flight.log: the log ends in the middle of a message, as where power was cut: it is read up to there",
             "flight.log: 100 bytes in 1 place are no messages, as in a file that is damaged: they are left out",
-            "flight.log: 2 messages are not as they were declared, and are left out",
-            "flight.log: the recorder was too slow 1 times, and left out 1.500 s in all",
+            "flight.log: 2 messages are not as declared, and left out",
+            "flight.log: the recorder was too slow 1 time, and left out 1.500 s in all",
         ]
     );
 }
@@ -192,8 +192,8 @@ fn times_that_go_back_are_sorted_and_stand_once() {
     assert_eq!(
         table.words,
         [
-            "flight.log: the times of 'attitude' go back in 1 places: its rows are sorted",
-            "flight.log: 'attitude' has 1 rows with the time of the one that follows: they are left out",
+            "flight.log: the times of 'attitude' go back in 1 place: its rows are sorted",
+            "flight.log: 'attitude' has 1 row with the time of the one that follows: left out",
         ]
     );
 }
@@ -211,4 +211,17 @@ fn a_log_without_messages_is_refused() {
             "{error}"
         );
     }
+}
+
+#[test]
+fn a_topic_whose_clock_stands_still_has_none() {
+    let row = |value: f32| data(0, 0, &floats(&[value, 0.0]));
+    let log = [declarations(), row(1.0), row(2.0), battery(1, 5, 12.0)].concat();
+    let reader = reader(&log);
+    let rates = selection(&reader, &["attitude.rollspeed"]);
+    let error = reader.table(&rates).unwrap_err().to_string();
+    assert!(
+        error.contains("the messages of 'attitude' all have the same time, 0 s: it has no clock"),
+        "{error}"
+    );
 }

@@ -69,9 +69,8 @@ fn entries_are_topics() {
     assert_eq!(
         reader.remarks(),
         [
-            "flight.log: 1 of the entries hold structures, of which no numbers are read, and are left out (record their \
-             numbers as entries): pose",
-            "flight.log: 1 of the entries hold no numbers, or others than before, and are left out: console",
+            "flight.log: entries of structures are left out (record their numbers as entries of their own): pose",
+            "flight.log: entries without numbers, or with others than before, are left out: console",
         ]
     );
     let modules = table(&log, &["drive/modules[1]", "drive/modules[0]"]);
@@ -100,7 +99,7 @@ fn an_entry_that_starts_again_goes_on() {
     .concat();
     let table = whole(&log).unwrap();
     assert_eq!((table.columns, table.time), (vec![vec![1.0, 2.0]], Some(vec![1e-5, 2e-5])));
-    assert_eq!(table.words, ["flight.log: 1 messages are not as they were declared, and are left out"]);
+    assert_eq!(table.words, ["flight.log: 1 message is not as declared, and left out"]);
     assert_eq!(reader(&log).remarks().len(), 2);
 }
 

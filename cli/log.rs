@@ -396,7 +396,8 @@ pub(crate) fn follow(
     // A clock that is not named is not taken: of a log that is still being written there may be one row.
     let mut hint = None;
     let live = match &job.clock {
-        Clock::Unknown { .. } => {
+        // A topic has its own.
+        Clock::Unknown { .. } if reader.topics().is_none() => {
             let columns = find_all(&names, reader.names()).unwrap_or_default();
             hint = free_clocks(&reader, &columns).first().map(|clock| called(*clock, reader.names()));
             &LogJob { clock: Clock::Fixed(1.0), options: job.options.clone(), ..*job }

@@ -181,7 +181,7 @@ fn the_plant_between_two_topics_is_found() {
 fn another_clock_is_asked_for() {
     let folder = folder();
     for (log, channels) in CHANNELS {
-        let command = format!("fit {log} {channels} --resample 0.01:auto --structure p1 --initial estimate");
+        let command = format!("{log} {channels} --resample 0.01:auto --structure p1 --initial estimate");
         let report = folder.fit(&command);
         assert_eq!(report["data"]["logs"][0]["resampled"]["step"], 0.01, "{log}");
         let found = number(&report, "/model/parameters/1/value");

@@ -119,5 +119,7 @@ pub(super) fn on_one_clock(
 /// How many rows there are in a second, as a message says it.
 fn rate(time: &[f64]) -> String {
     let duration = time.last().zip(time.first()).map_or(0.0, |(last, first)| last - first);
-    if duration > 0.0 { short((time.len() - 1) as f64 / duration) } else { "0".to_owned() }
+    let hertz = if duration > 0.0 { (time.len() - 1) as f64 / duration } else { 0.0 };
+    // Three digits tell rates apart.
+    short(format!("{hertz:.2e}").parse().unwrap_or(hertz))
 }

@@ -91,6 +91,14 @@ impl Variable {
     }
 }
 
+/// What a variable is.
+enum Matrix {
+    /// A full real matrix of numbers.
+    Numbers(Variable),
+    /// Anything else, by its name.
+    Other(String),
+}
+
 /// What is in a file.
 #[derive(Default)]
 struct Found {
@@ -155,51 +163,40 @@ impl Found {
     }
 
     fn variable(&mut self, data: &[u8], file: &str) -> Result<(), Error> {
-        let Some((name, variable)) = self.matrix(data) else {
-            self.is_cut = true;
-            return Ok(());
-        };
-        match variable {
-            Some((rows, values)) => {
-                let variable = Variable { name, rows, values };
+        match self.matrix(data) {
+            None => self.is_cut = true,
+            Some(Matrix::Other(name)) => self.others.push(name),
+            Some(Matrix::Numbers(variable)) => {
                 let columns: usize = self.variables.iter().map(Variable::columns).sum();
                 if columns.saturating_add(variable.columns()) > MOST_COLUMNS {
-                    return Err(Error::data(
-                        file,
-                        None,
-                        format!(
-                            "it has more than {MOST_COLUMNS} columns; save fewer variables, each with a row for each sample"
-                        ),
-                    ));
+                    let message = format!(
+                        "it has more than {MOST_COLUMNS} columns; save fewer variables, each with a row for each sample"
+                    );
+                    return Err(Error::data(file, None, message));
                 }
                 self.variables.push(variable);
             }
-            None => self.others.push(name),
         }
         Ok(())
     }
 
-    /// The name of a variable, with its rows and its values column by column if it is a full real matrix of numbers. None if it does not
-    /// hold together.
-    #[expect(clippy::type_complexity, reason = "its parts are told apart by the caller at once")]
-    fn matrix(&self, data: &[u8]) -> Option<(String, Option<(usize, Vec<f64>)>)> {
+    /// None for a variable that does not hold together.
+    fn matrix(&self, data: &[u8]) -> Option<Matrix> {
         const IS_COMPLEX: u32 = 0x800;
         let ((_, flags), rest) = self.element(data)?;
         let flags = self.u32(flags, 0)?;
         // Objects have no dimensions here.
         if flags & 0xff > 15 {
-            return Some((String::new(), None));
+            return Some(Matrix::Other("an object".to_owned()));
         }
         let ((_, sizes), rest) = self.element(rest)?;
         let ((_, name), rest) = self.element(rest)?;
         let name = String::from_utf8_lossy(name).into_owned();
-        let sizes: Option<Vec<usize>> =
-            (0..sizes.len() / 4).map(|place| self.u32(sizes, 4 * place).map(|size| size as usize)).collect();
-        let sizes = sizes?;
+        let size = |place: usize| self.u32(sizes, 4 * place).map(|size| size as usize);
+        let sizes: Option<Vec<usize>> = (0..sizes.len() / 4).map(size).collect();
         // Doubles, singles and whole numbers, and what is logical among these.
-        let (&[rows, columns], 6..=15, false) = (sizes.as_slice(), flags & 0xff, flags & IS_COMPLEX != 0)
-        else {
-            return Some((name, None));
+        let (&[rows, columns], 6..=15, 0) = (sizes?.as_slice(), flags & 0xff, flags & IS_COMPLEX) else {
+            return Some(Matrix::Other(name));
         };
         let ((kind, values), _) = self.element(rest)?;
         let values = self.numbers(kind, values)?;
@@ -208,7 +205,7 @@ impl Found {
         }
         // A row is a vector as well.
         let rows = if rows == 1 { columns } else { rows };
-        Some((name, Some((rows, values))))
+        Some(Matrix::Numbers(Variable { name, rows, values }))
     }
 
     fn numbers(&self, kind: u32, data: &[u8]) -> Option<Vec<f64>> {

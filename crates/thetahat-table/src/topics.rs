@@ -530,10 +530,8 @@ impl Wanted<'_> {
                 let mut is_last = last.iter().copied();
                 values.retain(|_| is_last.next().unwrap_or(true));
             }
-            words.push(format!(
-                "{file}: '{name}' has {} with the time of the one that follows: left out",
-                counted(repeated, "row", "rows")
-            ));
+            let places = counted(back, "place", "places");
+            words.push(format!("{file}: the times of '{name}' go back in {places}: its rows are sorted"));
         }
         for column in &self.columns {
             let name = escaped(&shortened(&column.field.name));

@@ -106,7 +106,7 @@ def read_log(
     Parameters
     ----------
     path : str or path, or a sequence of them
-        The file: Parquet, an Arrow file or stream (IPC, Feather 2), a ULog, a DataFlash log, a data log of WPILib, or CSV,
+        The file: Parquet, an Arrow file or stream (IPC, Feather 2), a ULog, a DataFlash log, a data log of WPILib, a MATLAB file, or CSV,
         gzip-compressed or not. Several files are several experiments with one plant.
     inputs : sequence of str, or str, optional
         The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.

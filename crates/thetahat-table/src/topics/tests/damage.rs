@@ -23,8 +23,9 @@ fn a_log_that_is_cut_anywhere_is_read_up_to_there() {
                     assert!(!table.words.iter().any(damage), "{end}: {:?}", table.words);
                 }
                 Err(error) => {
-                    assert_eq!(rows, 0, "{end}: {error}");
-                    assert!(error.to_string().starts_with("flight.log: "), "{error}");
+                    let error = error.to_string();
+                    assert!(rows == 0 || error.contains("has no clock"), "{end}: {error}");
+                    assert!(error.starts_with("flight.log: "), "{error}");
                 }
             }
         }

@@ -23,7 +23,7 @@ def ulog(path: Path, cut: int = 0) -> Path:
     log += message(b"F", b"motor:uint64_t timestamp;float[2] output;")
     log += message(b"F", b"rates:uint64_t timestamp;float roll;bool armed;")
     log += message(b"A", struct.pack("<BH", 0, 0) + b"motor") + message(b"A", struct.pack("<BH", 0, 1) + b"rates")
-    levels = np.repeat(np.random.default_rng(1).integers(-2, 3, 50), 6)
+    levels = [float(level) for level in np.repeat(np.random.default_rng(1).integers(-2, 3, 50), 6)]
     state = 0.0
     for row, level in enumerate(levels):
         begin = 1_000_000 + 20_000 * row
@@ -41,7 +41,8 @@ def ulog(path: Path, cut: int = 0) -> Path:
 
 def test_topics_are_listed(tmp_path: Path) -> None:
     motor, rates = th.topics(ulog(tmp_path / "flight.ulg"))
-    assert motor == th.Topic("motor", 300, pytest.approx(50), pytest.approx(5.98), ("motor.output[0]", "motor.output[1]"))
+    assert (motor.name, motor.rows, motor.columns) == ("motor", 300, ("motor.output[0]", "motor.output[1]"))
+    assert motor.rate == pytest.approx(50) and motor.duration == pytest.approx(5.98)
     assert (rates.name, rates.rows, rates.columns) == ("rates", 600, ("rates.roll", "rates.armed"))
     path = tmp_path / "log.csv"
     path.write_text("u,y\n1,2\n")
@@ -54,8 +55,8 @@ def test_columns_of_several_topics_are_put_on_one_clock(tmp_path: Path) -> None:
     log = th.read_log(path, inputs="motor.output[0]", output="rates.roll")
     assert log.sample_time == 0.01
     assert set(np.unique(log["motor.output[0]"])) == {-2, -1, 0, 1, 2}
-    model = th.process(log, "p1", initial="estimate").model
-    gain, time_constant = model.parameters.values()
+    model = th.process(log, "p1", initial="estimate")
+    gain, time_constant = model.parameters[:2]
     assert gain == pytest.approx(2, rel=0.01)
     assert time_constant == pytest.approx(0.1, rel=0.01)
     slow = th.read_log(path, inputs="motor.output[0]", output="rates.roll", resample=(0.02, "hold"))

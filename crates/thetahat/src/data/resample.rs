@@ -67,6 +67,31 @@ pub struct AntiAlias {
     pub taps: usize,
 }
 
+/// How a log was put on another clock.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Resampling {
+    /// Seconds between the new rows.
+    pub step: f64,
+    /// How values between samples were read.
+    pub interpolation: Interpolation,
+    /// The number of rows before.
+    pub rows: usize,
+    /// The filter that took out what the new clock cannot show; none where it does not apply, or was not wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anti_alias: Option<AntiAlias>,
+}
+
+impl Resampling {
+    /// What becomes of a log with these times.
+    ///
+    /// # Errors
+    /// As for [`Resample::filter_for`].
+    pub fn new(how: &Resample, time: &[f64]) -> Result<Self, Error> {
+        let Resample { step, interpolation, .. } = *how;
+        Ok(Self { step, interpolation, rows: time.len(), anti_alias: how.filter_for(time)? })
+    }
+}
+
 impl Resample {
     /// With an anti-alias filter where it applies.
     pub fn new(step: f64, interpolation: Interpolation) -> Self {

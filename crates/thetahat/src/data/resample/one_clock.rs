@@ -1,8 +1,8 @@
 //! Recordings whose clocks differ, on one clock: the topics of a flight or of a robot.
 
 use super::super::regular::Regular;
-use super::super::{Channel, GAP, Interpolation, Log, Recording, Resample, Resampling, Times};
-use super::{Grid, check, median_step, short, steps};
+use super::super::{Channel, GAP, Interpolation, Log, Recording, Times};
+use super::{Grid, Resample, Resampling, check, median_step, short, steps};
 use crate::Error;
 
 /// A recording of changes has at least this part of its steps longer than 1.5 medians, and at most this many values for each that differs

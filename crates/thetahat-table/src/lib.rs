@@ -1,5 +1,6 @@
-//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files and streams; and logs of
-//! flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash (ArduPilot) and WPILib data logs.
+//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files and
+//! streams; and logs of flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash (ArduPilot) and WPILib
+//! data logs.
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
 //! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks

@@ -1,8 +1,8 @@
-//! MATLAB files (level 5, as `save` writes with -v6 or -v7): the variables of one length as a text with tabs, which is then read as any
-//! other.
+//! MATLAB files (level 5, as `save` writes with -v6 or -v7): the variables of one length as a text with tabs, which is
+//! then read as any other.
 //!
-//! The format is that of "MAT-File Format" (The MathWorks), level 5. A damaged file must not ask for more memory than there is: sizes are
-//! compared with what is there before they are believed.
+//! The format is that of "MAT-File Format" (The MathWorks), level 5. A damaged file must not ask for more memory than
+//! there is: sizes are compared with what is there before they are believed.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;

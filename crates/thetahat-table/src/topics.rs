@@ -1,10 +1,11 @@
 //! Flight and robot logs: topics, each with a clock and fields of its own.
 //!
-//! The file is held in memory, unpacked, and walked twice: once for what there is, and once for the values of the columns that were
-//! selected. A message is a few bytes at a known place, so a field is an offset and a type, in all formats.
+//! The file is held in memory, unpacked, and walked twice: once for what there is, and once for the values of the
+//! columns that were selected. A message is a few bytes at a known place, so a field is an offset and a type, in all
+//! formats.
 //!
-//! Power is cut in the middle of a message, cards lose blocks: what can be read is read, and what is not is told. Nothing is reserved
-//! for what a file states, only for what stands in it.
+//! Power is cut in the middle of a message, cards lose blocks: what can be read is read, and what is not is told.
+//! Nothing is reserved for what a file states, only for what stands in it.
 
 mod dataflash;
 mod number;

@@ -1,5 +1,5 @@
-//! DataFlash, as ArduPilot records it: two bytes of mark, the kind of a message and its data. Messages of the kind FMT declare the
-//! others; those of the kind FMTU say, among other things, which field tells sensors of one kind apart.
+//! DataFlash, as ArduPilot records it: two bytes of mark, the kind of a message and its data. Messages of the kind FMT
+//! declare the others; those of the kind FMTU say, among other things, which field tells sensors of one kind apart.
 //!
 //! The letters of formats are those of ArduPilot's `LogStructure.h`.
 

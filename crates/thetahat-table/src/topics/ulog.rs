@@ -1,4 +1,5 @@
-//! ULog, as PX4 records it: messages with a size and a kind, of which some declare formats, some topics, and some are data.
+//! ULog, as PX4 records it: messages with a size and a kind, of which some declare formats, some topics, and some are
+//! data.
 //!
 //! The format is that of the PX4 developer guide ("ULog file format", versions 1 and 2).
 

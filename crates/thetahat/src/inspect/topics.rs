@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use crate::Document;
 use crate::document::document_methods;
 
-/// The topics of a log in which each has a clock of its own, as those of flights and robots. The JSON document `thetahat.topics/1`.
+/// The topics of a log in which each has a clock of its own, as those of flights and robots. The JSON document
+/// `thetahat.topics/1`.
 ///
 /// ```
 /// use thetahat::Document;

@@ -5,8 +5,8 @@ use super::super::{Channel, GAP, Interpolation, Log, Recording, Times};
 use super::{Grid, Resample, Resampling, check, median_step, short, steps};
 use crate::Error;
 
-/// A recording of changes has at least this part of its steps longer than 1.5 medians, and at most this many values for each that differs
-/// from all before it.
+/// A recording of changes has at least this part of its steps longer than 1.5 medians, and at most this many values for
+/// each that differs from all before it.
 const LONG: f64 = 0.05;
 const VALUES_FOR_A_LEVEL: usize = 2;
 
@@ -19,8 +19,8 @@ struct Part {
     on_change: Vec<bool>,
 }
 
-/// Whether a channel is recorded where it changes, and not at each step: no value is that of the message before, there are few levels,
-/// and some of them last.
+/// Whether a channel is recorded where it changes, and not at each step: no value is that of the message before, there
+/// are few levels, and some of them last.
 fn is_on_change(values: &[f64], time: &[f64], step: f64) -> bool {
     let long = steps(time).filter(|own| *own > GAP * step).count();
     if (long as f64) < LONG * time.len() as f64 || values.windows(2).any(|pair| pair[0] == pair[1]) {
@@ -93,17 +93,20 @@ impl Part {
 }
 
 impl Log {
-    /// Recordings with clocks of their own, of which the times count alike, on one uniform clock, from where the last of them begins to
-    /// where the first ends. Without `how` the step is about the usual one of the fastest, and each channel is read its own way.
+    /// Recordings with clocks of their own, of which the times count alike, on one uniform clock, from where the last
+    /// of them begins to where the first ends. Without `how` the step is about the usual one of the fastest, and each
+    /// channel is read its own way.
     ///
-    /// A channel that is recorded only where it changes, as its few levels and its uneven steps show, is held wherever channels are read
-    /// their own way, also after its last change.
+    /// A channel that is recorded only where it changes, as its few levels and its uneven steps show, is held wherever
+    /// channels are read their own way, also after its last change.
     ///
-    /// Each recording is read as [`Log::resampled`] reads it: with an anti-alias filter where `how` asks for one and it applies. Gives with
-    /// the log how it was made; the rows are those of the longest recording, the filter is the longest.
+    /// Each recording is read as [`Log::resampled`] reads it: with an anti-alias filter where `how` asks for one and it
+    /// applies. Gives with the log how it was made; the rows are those of the longest recording, the filter is the
+    /// longest.
     ///
     /// # Errors
-    /// As for [`Log::resampled`]; [`Error::Data`] for recordings without a time in common, and [`Error::Argument`] for none at all.
+    /// As for [`Log::resampled`]; [`Error::Data`] for recordings without a time in common, and [`Error::Argument`] for
+    /// none at all.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Recording, Times};

@@ -7,8 +7,10 @@
 //! Power is cut in the middle of a message, cards lose blocks: what can be read is read, and what is not is told.
 //! Nothing is reserved for what a file states, only for what stands in it.
 
+mod columns;
 mod dataflash;
 mod number;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod ulog;
@@ -16,22 +18,20 @@ mod wpilog;
 
 use std::collections::HashMap;
 use std::io::{self, Read};
-use std::ops::{ControlFlow, Range};
-use std::thread;
+use std::ops::ControlFlow;
 
 use super::error::{Error, escaped, shortened};
-use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::source::{Bytes, Topical};
-use super::{Options, OwnClock, Selection, Table, Topic};
+use super::{Options, Selection, Table, Topic};
+use columns::{Column, Wanted, joined};
 use number::Number;
+pub(super) use stream::TopicStream;
 
 /// What is read of a file at once.
 const PIECE: usize = 1 << 20;
 /// A log has no more columns than this, and no longer names: a damaged file must not ask for more memory than there is.
 const MOST_COLUMNS: usize = 1 << 18;
 const LONGEST_NAME: usize = 512;
-/// A row of a stream for each of these is handed on at once.
-const ROWS_OF_A_PIECE: usize = 1 << 10;
 /// This many names are told.
 const MOST_TOLD: usize = 6;
 
@@ -329,29 +329,7 @@ impl TopicsReader {
     /// Gives the rows one by one; see [`Reader::stream`](super::Reader::stream).
     pub(super) fn stream(self, selection: &Selection) -> Result<TopicStream, Error> {
         let file = self.file.clone();
-        let mut table = self.one_topic(selection)?;
-        let stream = TopicStream {
-            values: vec![0.0; selection.columns.len()],
-            words: std::mem::take(&mut table.words),
-            part: Part::default(),
-            next: 0,
-            row: 0,
-            ended: false,
-            mailbox: Mailbox::new(),
-        };
-        let sender = stream.mailbox.sender();
-        let send = move || {
-            for first in (0..table.rows).step_by(ROWS_OF_A_PIECE) {
-                let rows = first..table.rows.min(first + ROWS_OF_A_PIECE);
-                if sender.send(Message::Piece(Part::of(&table, rows))).is_err() {
-                    return;
-                }
-            }
-            drop(sender.send(Message::End));
-        };
-        let begun = thread::Builder::new().spawn(send);
-        begun.map_err(|error| Error::no_thread(&file, &error))?;
-        Ok(stream)
+        TopicStream::of(self.one_topic(selection)?).map_err(|error| Error::no_thread(&file, &error))
     }
 
     /// The selected columns, if all are of one topic.
@@ -406,12 +384,12 @@ impl TopicsReader {
             let own = match wanted.iter().position(|wanted| wanted.topic == topic) {
                 Some(own) => own,
                 None => {
-                    wanted.push(Wanted { topic, name: &found.name, time: Vec::new(), columns: Vec::new() });
+                    wanted.push(Wanted::new(topic, &found.name));
                     wanted.len() - 1
                 }
             };
             if let Some(wanted) = wanted.get_mut(own) {
-                wanted.columns.push(Column { place, field, values: Vec::new(), infinite: 0, rounded: 0 });
+                wanted.columns.push(Column::new(place, field));
             }
         }
         let rows = |topic: usize| self.topics.get(topic).map_or(0, |topic| topic.rows);
@@ -442,112 +420,6 @@ impl TopicsReader {
         let mut words = self.damage.clone();
         wanted.iter_mut().for_each(|wanted| wanted.sort(&file, &mut words));
         Ok(joined(wanted, selection.columns.len(), words))
-    }
-}
-
-/// The columns of all topics, each at its place.
-fn joined(mut wanted: Vec<Wanted<'_>>, columns: usize, words: Vec<String>) -> Table {
-    let mut table = Table { columns: vec![Vec::new(); columns], words, ..Table::default() };
-    table.rows = wanted.iter().map(|wanted| wanted.time.len()).max().unwrap_or(0);
-    for column in wanted.iter_mut().flat_map(|wanted| &mut wanted.columns) {
-        if let Some(place) = table.columns.get_mut(column.place) {
-            *place = std::mem::take(&mut column.values);
-        }
-    }
-    match wanted.as_mut_slice() {
-        [one] => table.time = Some(std::mem::take(&mut one.time)),
-        several => {
-            table.clocks = several
-                .iter_mut()
-                .map(|wanted| OwnClock {
-                    topic: wanted.name.to_owned(),
-                    time: std::mem::take(&mut wanted.time),
-                    columns: wanted.columns.iter().map(|column| column.place).collect(),
-                })
-                .collect();
-        }
-    }
-    table
-}
-
-/// The columns of a topic that are read.
-struct Wanted<'t> {
-    topic: usize,
-    name: &'t str,
-    time: Vec<f64>,
-    columns: Vec<Column<'t>>,
-}
-
-struct Column<'t> {
-    /// Its place among those that were selected.
-    place: usize,
-    field: &'t Field,
-    values: Vec<f64>,
-    /// How many values were infinite, and beyond what 64 bits of floating point hold.
-    infinite: usize,
-    rounded: usize,
-}
-
-impl Wanted<'_> {
-    fn add(&mut self, time: f64, data: &[u8]) {
-        /// Whole numbers up to here are what they are.
-        const EXACT: f64 = (1_u64 << 53) as f64;
-        self.time.push(time);
-        for column in &mut self.columns {
-            let Field { at, number, divisor, .. } = *column.field;
-            let mut value = number.read(data, at).map_or(f64::NAN, |value| value / divisor);
-            if value.is_infinite() {
-                value = f64::NAN;
-                column.infinite += 1;
-            }
-            column.rounded += usize::from(number.is_long() && value.abs() > EXACT);
-            column.values.push(value);
-        }
-    }
-
-    /// Puts the rows in the order of their times, of which each stands once, and says what was done.
-    fn sort(&mut self, file: &str, words: &mut Vec<String>) {
-        let name = escaped(&shortened(self.name));
-        let back = self.time.windows(2).filter(|pair| pair[1] < pair[0]).count();
-        if back > 0 {
-            let mut order: Vec<usize> = (0..self.time.len()).collect();
-            let time = &self.time;
-            order.sort_by(|a, b| time[*a].total_cmp(&time[*b]));
-            let sorted = |values: &Vec<f64>| order.iter().map(|&row| values[row]).collect::<Vec<f64>>();
-            for column in &mut self.columns {
-                column.values = sorted(&column.values);
-            }
-            self.time = sorted(&self.time);
-            words
-                .push(format!("{file}: the times of '{name}' go back in {back} places: its rows are sorted"));
-        }
-        let repeated = self.time.windows(2).filter(|pair| pair[1] == pair[0]).count();
-        if repeated > 0 {
-            let last: Vec<bool> = (0..self.time.len())
-                .map(|row| self.time.get(row + 1).is_none_or(|next| *next != self.time[row]))
-                .collect();
-            let columns = self.columns.iter_mut().map(|column| &mut column.values);
-            for values in columns.chain([&mut self.time]) {
-                let mut is_last = last.iter().copied();
-                values.retain(|_| is_last.next().unwrap_or(true));
-            }
-            let places = counted(back, "place", "places");
-            words.push(format!("{file}: the times of '{name}' go back in {places}: its rows are sorted"));
-        }
-        for column in &self.columns {
-            let name = escaped(&shortened(&column.field.name));
-            if column.infinite > 0 {
-                let count =
-                    counted(column.infinite, "infinite value, which counts", "infinite values, which count");
-                words.push(format!("{file}: column '{name}' has {count} as missing"));
-            }
-            if column.rounded > 0 {
-                words.push(format!(
-                    "{file}: column '{name}' has whole numbers beyond 2^53, which are rounded to the nearest ones that 64 \
-                     bits of floating point hold"
-                ));
-            }
-        }
     }
 }
 
@@ -585,77 +457,4 @@ fn listed(names: &[&str]) -> String {
     let first: Vec<String> = names.iter().take(MOST_TOLD).map(|name| escaped(&shortened(name))).collect();
     let more = names.len().saturating_sub(MOST_TOLD);
     if more > 0 { format!("{} and {more} more", first.join(", ")) } else { first.join(", ") }
-}
-
-/// Some rows, one after the other.
-#[derive(Default)]
-struct Part {
-    columns: Vec<Vec<f64>>,
-    time: Vec<f64>,
-}
-
-impl Part {
-    fn of(table: &Table, rows: Range<usize>) -> Self {
-        let part = |values: &Vec<f64>| values.get(rows.clone()).unwrap_or_default().to_vec();
-        Self {
-            columns: table.columns.iter().map(part).collect(),
-            time: table.time.as_ref().map(part).unwrap_or_default(),
-        }
-    }
-}
-
-/// The rows of a topic, one after the other.
-pub(super) struct TopicStream {
-    values: Vec<f64>,
-    words: Vec<String>,
-    part: Part,
-    next: usize,
-    /// The number of the row at hand, counted from one.
-    row: u64,
-    ended: bool,
-    mailbox: Mailbox<Part>,
-}
-
-impl TopicStream {
-    pub(super) fn waker(&self) -> Waker {
-        self.mailbox.waker()
-    }
-
-    pub(super) fn values(&self) -> &[f64] {
-        &self.values
-    }
-
-    pub(super) fn time(&self) -> Option<f64> {
-        self.part.time.get(self.next.checked_sub(1)?).copied()
-    }
-
-    pub(super) fn row(&self) -> u64 {
-        self.row
-    }
-
-    pub(super) fn words(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.words)
-    }
-
-    pub(super) fn next(&mut self) -> Result<Event, Error> {
-        while self.next >= self.part.time.len() {
-            if self.ended {
-                return Ok(Event::End);
-            }
-            match self.mailbox.take() {
-                None => return Ok(Event::Idle),
-                Some(Message::Failed(error)) => return Err(error),
-                Some(Message::Stop) => return Ok(Event::Stopped),
-                Some(Message::End) => self.ended = true,
-                Some(Message::Piece(part)) => (self.part, self.next) = (part, 0),
-            }
-        }
-        self.mailbox.forget();
-        for (value, column) in self.values.iter_mut().zip(&self.part.columns) {
-            *value = column.get(self.next).copied().unwrap_or(f64::NAN);
-        }
-        self.next += 1;
-        self.row += 1;
-        Ok(Event::Row)
-    }
 }

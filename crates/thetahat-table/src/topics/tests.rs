@@ -8,9 +8,10 @@ mod wpilog;
 use std::io::Cursor;
 use std::ops::ControlFlow;
 
+use super::super::mailbox::Event;
 use super::super::memory::Bound;
 use super::super::source::Format;
-use super::super::{ErrorKind, Header, Reader};
+use super::super::{ErrorKind, Header, OwnClock, Reader};
 use super::*;
 
 fn opened(bytes: &[u8], options: &Options) -> Result<TopicsReader, Error> {

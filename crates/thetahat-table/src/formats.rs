@@ -12,7 +12,9 @@ use super::mailbox::{Event, Waker};
 #[cfg(feature = "matlab")]
 use super::matlab::{self, Variables};
 use super::reader::{SIZES, TextReader};
-use super::source::{Bytes, Format, Source};
+#[cfg(any(feature = "columnar", feature = "flight-logs", feature = "matlab", feature = "spreadsheets"))]
+use super::source::Format;
+use super::source::{Bytes, Source};
 #[cfg(feature = "spreadsheets")]
 use super::spreadsheet::{self, Sheet};
 use super::stream::TextStream;

@@ -89,8 +89,8 @@ impl<'t> Wanted<'t> {
                 column.values = sorted(&column.values);
             }
             self.time = sorted(&self.time);
-            words
-                .push(format!("{file}: the times of '{name}' go back in {back} places: its rows are sorted"));
+            let places = counted(back, "place", "places");
+            words.push(format!("{file}: the times of '{name}' go back in {places}: its rows are sorted"));
         }
         let repeated = self.time.windows(2).filter(|pair| pair[1] == pair[0]).count();
         if repeated > 0 {
@@ -102,8 +102,9 @@ impl<'t> Wanted<'t> {
                 let mut is_last = last.iter().copied();
                 values.retain(|_| is_last.next().unwrap_or(true));
             }
-            let places = counted(back, "place", "places");
-            words.push(format!("{file}: the times of '{name}' go back in {places}: its rows are sorted"));
+            let rows = counted(repeated, "row", "rows");
+            words
+                .push(format!("{file}: '{name}' has {rows} with the time of the one that follows: left out"));
         }
         for column in &self.columns {
             let name = escaped(&shortened(&column.field.name));

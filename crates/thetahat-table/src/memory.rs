@@ -36,7 +36,7 @@ impl Bound {
     }
 
     /// What this many bytes are that are held at once while rows are read, in words, if it is more than there is.
-    #[cfg(feature = "columnar")]
+    #[cfg(any(feature = "columnar", feature = "spreadsheets"))]
     pub(crate) fn passed_by_bytes(&self, bytes: u64) -> Option<String> {
         let free = self.free.filter(|free| bytes > *free)?;
         Some(format!("one of its batches takes {} unpacked, and {} are free", said(bytes), said(free)))

@@ -351,6 +351,8 @@ pub(crate) enum DocumentArgument {
     Comparison,
     /// What inspect writes
     Inspection,
+    /// What inspect writes of a log of topics without names of columns
+    Topics,
     /// What spectrum writes
     Response,
     /// What step writes of a log

@@ -8,7 +8,7 @@ use clap::Args;
 use thetahat::control::Control;
 use thetahat::data::{Log, Source};
 use thetahat::design::{ExperimentDesign, SignalPlan};
-use thetahat::inspect::Inspection;
+use thetahat::inspect::{Inspection, TopicList};
 use thetahat::model::Model;
 use thetahat::report::{
     EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, StateSpacePlan, ValidationPlan,
@@ -30,6 +30,7 @@ use crate::job::{
     DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
     StateSpaceJob, StepTestJob, control_plan,
 };
+use crate::log;
 use crate::replace::replace;
 
 /// Logs that were read as one.
@@ -183,6 +184,22 @@ pub fn inspect(options: &[OsString]) -> Result<Inspection, Failure> {
     let mut job = InspectJob::resolve(&arguments)?;
     job.log.quiet = true;
     Ok(inspected(&job, &arguments)?.0)
+}
+
+/// What `thetahat inspect` says of the topics of a file with these options, without names of columns.
+///
+/// # Errors
+/// A [`Failure`] as the program would report it, and one for a log without topics.
+pub fn topic_list(options: &[OsString]) -> Result<TopicList, Failure> {
+    let arguments: InspectArguments = arguments("inspect", options)?;
+    let job = InspectJob::resolve(&arguments)?;
+    let reader = log::open(&job.path, &job.log)?;
+    log::list_of_topics(&reader, &job.path).ok_or_else(|| {
+        Failure::data(format!(
+            "{}: it has no topics with clocks of their own, but columns with one; inspect it",
+            job.path.display()
+        ))
+    })
 }
 
 /// The plan that `thetahat spectrum` makes of these options for a log with these channels.

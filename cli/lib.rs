@@ -42,13 +42,13 @@ use thetahat::text;
 
 pub use binding::{
     Opened, compare_signals, controller_of, equations_plan, inspect, narx_plan, pieces, plan, process_plan,
-    read, response_plan, signal_plan, spectrum_plan, state_space_plan, step_test_plan, track, tuning_of,
-    validation_plan, write,
+    read, response_plan, signal_plan, spectrum_plan, state_space_plan, step_test_plan, topic_list, track,
+    tuning_of, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::summary::{
-    comparison, control, experiment_design, filtered, inspection, response, step_test, table, tracking,
-    tuning, validation,
+    comparison, control, experiment_design, filtered, inspection, response, step_test, table, topics,
+    tracking, tuning, validation,
 };
 pub use commands::{Journal, Making, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};

@@ -1,5 +1,7 @@
 //! From a table to a log: which columns, which clock, and in which row an error is.
 
+mod topics;
+
 use std::collections::{HashMap, HashSet};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -14,6 +16,8 @@ use crate::interrupt;
 use crate::job::{Clock, LogJob};
 use crate::messages;
 use crate::progress::Reading;
+
+pub(crate) use topics::list as list_of_topics;
 
 /// A log and where it came from, its rows counted from 1.
 #[derive(Debug)]
@@ -106,7 +110,7 @@ pub(crate) fn load(
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
     let Columns { channels, table, mut source, clock, restarts, mut words } =
-        columns(path, job, false, |reader| choose(reader.names()))?;
+        columns(open(path, job)?, path, job, false, |reader| choose(reader.names()))?;
     let file = source.file.clone();
     let rows = table.rows;
     if let (Some(how), Some(time)) = (clock.resample(), &table.time) {
@@ -228,7 +232,8 @@ pub(crate) fn in_parts<T>(
 ) -> Result<Vec<String>, Failure> {
     let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
-    let (names, lags, chosen) = choose(&reader)?;
+    let (names, lags, chosen) =
+        choose(&reader).map_err(|failure| topics::explained(failure, &reader, path))?;
     let Selected { selection, clock, note, mut words } = selected(&reader, &file, job, &names)?;
     let most = (PART / (names.len() + 1)).max(2 * lags);
     let mut before = Before { file: &file, names: &names, clock, lags, rows: 0, tail: Tail::default() };
@@ -344,11 +349,13 @@ pub(crate) struct Recorded {
 
 /// Reads the columns of a log that `choose` names as they are, one row a second without a clock.
 pub(crate) fn record(
+    reader: Reader,
     path: &Path,
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Recorded, Failure> {
-    let Columns { channels, table, source, clock, restarts, words } = columns(path, job, true, choose)?;
+    let Columns { channels, table, source, clock, restarts, words } =
+        columns(reader, path, job, true, choose)?;
     let time = table.time.map(|time| after_pauses(time, &restarts));
     let times = times(&clock, time);
     Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
@@ -368,8 +375,8 @@ fn after_pauses(mut time: Vec<f64>, starts: &[usize]) -> Vec<f64> {
 /// When the rows were recorded: one a second without a clock.
 fn times(clock: &Clock, time: Option<Vec<f64>>) -> Times {
     match (clock, time) {
+        (Clock::Fixed(seconds), _) => Times::Uniform(*seconds),
         (_, Some(time)) => Times::Measured(time),
-        (Clock::Fixed(seconds), None) => Times::Uniform(*seconds),
         (_, None) => Times::Uniform(1.0),
     }
 }
@@ -384,12 +391,13 @@ pub(crate) fn follow(
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<(Stream, Vec<String>), Failure> {
     let reader = Reader::open_live(path, &options(job))?;
-    let names = choose(reader.names())?;
+    let names = choose(reader.names()).map_err(|failure| topics::explained(failure, &reader, path))?;
     let file = path.display().to_string();
     // A clock that is not named is not taken: of a log that is still being written there may be one row.
     let mut hint = None;
     let live = match &job.clock {
-        Clock::Unknown { .. } => {
+        // A topic has its own.
+        Clock::Unknown { .. } if reader.topics().is_none() => {
             let columns = find_all(&names, reader.names()).unwrap_or_default();
             hint = free_clocks(&reader, &columns).first().map(|clock| called(*clock, reader.names()));
             &LogJob { clock: Clock::Fixed(1.0), options: job.options.clone(), ..*job }
@@ -429,23 +437,38 @@ struct Columns {
     words: Vec<String>,
 }
 
-/// Reads the columns that `choose` names. `any_order` is whether a clock that stands still or goes back will do.
+/// Opens a log, and reads as far as its first row.
+pub(crate) fn open(path: &Path, job: &LogJob) -> Result<Reader, Failure> {
+    Ok(Reader::open(path, &options(job))?)
+}
+
+/// Reads the columns of a log that `choose` names. `any_order` is whether a clock that stands still or goes back will do.
 fn columns(
+    reader: Reader,
     path: &Path,
     job: &LogJob,
     any_order: bool,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Columns, Failure> {
-    let reader = Reader::open(path, &options(job))?;
     let file = path.display().to_string();
-    let names = choose(&reader)?;
-    let Selected { selection, clock, note, mut words } = selected(&reader, &file, job, &names)?;
+    let names = choose(&reader).map_err(|failure| topics::explained(failure, &reader, path))?;
+    let Selected { selection, mut clock, mut note, mut words } = selected(&reader, &file, job, &names)?;
 
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
     let mut table = reader.read(&selection, &mut update)?;
     drop(progress);
     words.append(&mut table.words);
+    let mut resampled = None;
+    if !table.clocks.is_empty() {
+        let (how, said) = topics::on_one_clock(&file, &names, &mut table, clock.resample())?;
+        (resampled, note) = (Some(how), Some(said).filter(|_| !job.quiet));
+        clock = Clock::Unknown { resample: None };
+    }
+    // Rows that are evenly apart have no times, also where the log has some.
+    if let Clock::Fixed(_) = clock {
+        table.time = None;
+    }
     let mut restarts = Vec::new();
     if let Some(time) = table.time.take() {
         let kept = any_order.then(|| time.clone());
@@ -464,7 +487,7 @@ fn columns(
     let values = std::mem::take(&mut table.columns);
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
-    let source = Source { file, rows, time: clock.column(), start: table.start.take(), resampled: None };
+    let source = Source { file, rows, time: clock.column(), start: table.start.take(), resampled };
     Ok(Columns { channels, table, source, clock, restarts, words })
 }
 
@@ -498,9 +521,14 @@ struct Selected {
 fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Result<Selected, Failure> {
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();
-    let columns = find_all(names, header).map_err(bad)?;
+    let columns = find_all(names, header).map_err(bad);
+    let columns = columns.map_err(|failure| topics::explained(failure, reader, Path::new(file)))?;
     let (mut taken, mut words) = (None, Vec::new());
     let (clock, found) = match &job.clock {
+        _ if reader.topics().is_some() => {
+            let topics = reader.topics().unwrap_or_default();
+            (topics::clock(topics, &columns, job).map_err(bad)?, None)
+        }
         Clock::Unknown { resample } => {
             let found = free_clocks(reader, &columns);
             let found = match found.as_slice() {

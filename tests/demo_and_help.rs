@@ -136,6 +136,7 @@ fn every_document_has_a_schema() {
         "validation",
         "comparison",
         "inspection",
+        "topics",
         "response",
         "step",
         "tuning",

@@ -26,6 +26,8 @@ mod equations;
 mod export;
 mod filter;
 mod fit_reference;
+#[cfg(feature = "flight-logs")]
+mod flight_logs;
 mod floors;
 mod focus;
 mod forecast;

@@ -193,14 +193,17 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");
-    for subfolder in ["tests/data/public", "tests/data/columnar", "tests/data/spreadsheets"] {
+    for subfolder in
+        ["tests/data/public", "tests/data/columnar", "tests/data/flights", "tests/data/spreadsheets"]
+    {
         fs::create_dir_all(folder.path(subfolder)).expect("the folder can be written to");
     }
     let public = files("tests/data/public", ".csv");
     let columnar = files("tests/data/columnar", ".parquet");
+    let flights = files("tests/data/flights", ".ulg");
     let sheets = files("tests/data/spreadsheets", ".xlsx");
-    for file in [files("tests/data", ".toml"), files("tests/data", ".csv"), public, columnar, sheets].concat()
-    {
+    let own = [files("tests/data", ".toml"), files("tests/data", ".csv")].concat();
+    for file in [own, public, columnar, flights, sheets].concat() {
         folder.write(&file, fs::read(root().join(&file)).expect("data"));
     }
     let (mut compared, mut code) = (0, 0);

@@ -11,7 +11,7 @@ pub(crate) struct FilterArguments {
     /// The model: a report of fit, or a TOML file with matrices or equations (- for standard input)
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 

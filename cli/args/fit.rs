@@ -10,7 +10,7 @@ use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, Names};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct FitArguments {
-    /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files (- for standard input)
+    /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input)
     #[arg(value_name = "LOG", required_unless_present_any = ["from", "list"])]
     pub(crate) logs: Vec<PathBuf>,
     /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure or

@@ -8,7 +8,7 @@ use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, Names};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InspectArguments {
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG", required_unless_present = "list")]
     pub(crate) logs: Vec<PathBuf>,
 

@@ -83,7 +83,7 @@ pub(crate) struct RespondArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
     /// Rows to respond to, 1-based and inclusive [default: all]

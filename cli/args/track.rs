@@ -9,7 +9,7 @@ use super::{LineArguments, LiveClockArguments, LogArguments, MapArgument, Names}
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArguments {
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 

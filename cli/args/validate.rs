@@ -11,7 +11,7 @@ pub(crate) struct ValidateArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG", required_unless_present = "list")]
     pub(crate) logs: Vec<PathBuf>,
     /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
@@ -30,7 +30,7 @@ pub(crate) struct CompareArguments {
     /// The reports that fit wrote (- for standard input)
     #[arg(value_name = "REPORT", required = true, num_args = 1..)]
     pub(crate) reports: Vec<PathBuf>,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) path: PathBuf,
     /// Lay the models over a measured frequency response too, the JSON document of spectrum: how many of its points each misses

@@ -5,7 +5,7 @@ use thetahat::Document;
 use thetahat::control::Control;
 use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
-use thetahat::inspect::Inspection;
+use thetahat::inspect::{Inspection, TopicList};
 use thetahat::report::{Comparison, NormalEquations, Report, Validation};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
@@ -23,6 +23,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Validation => Validation::json_schema(),
         DocumentArgument::Comparison => Comparison::json_schema(),
         DocumentArgument::Inspection => Inspection::json_schema(),
+        DocumentArgument::Topics => TopicList::json_schema(),
         DocumentArgument::Response => MeasuredResponse::json_schema(),
         DocumentArgument::Step => StepTest::json_schema(),
         DocumentArgument::Tuning => Tuning::json_schema(),

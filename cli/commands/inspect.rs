@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use thetahat::data::{Finding, Recording, Source, Times};
-use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection};
+use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection, TopicList};
 use thetahat::report::inspection_page;
 use thetahat::{Document, text};
 use thetahat_table::Reader;
@@ -24,7 +24,13 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
         return each(&arguments.each, &arguments.logs, &of_many(arguments)?, |log| one(arguments, log));
     }
     let job = InspectJob::resolve(arguments)?;
-    let (inspection, recording) = inspected(&job, arguments)?;
+    let reader = if arguments.stream { None } else { Some(log::open(&job.path, &job.log)?) };
+    let topics =
+        reader.as_ref().filter(|_| !job.is_named()).and_then(|reader| log::list_of_topics(reader, &job.path));
+    if let Some(topics) = topics {
+        return list(&topics, arguments);
+    }
+    let (inspection, recording) = inspected_in(&job, arguments, reader)?;
     if let (Some(path), Some(Recording { channels, times })) = (&arguments.html, recording) {
         let time = match times {
             Times::Measured(time) => time,
@@ -34,13 +40,30 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
             channels.into_iter().map(|channel| (channel.name, channel.values)).collect();
         output::page(path, &inspection_page(&inspection, &signals, &time, line))?;
     }
-    // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
     let text = match arguments.format {
         FormatArgument::Json => inspection.to_json().map_err(|error| Failure::data(error.to_string()))?,
-        FormatArgument::Table => summary::inspection(&inspection, width),
+        FormatArgument::Table => summary::inspection(&inspection, width(arguments)),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+}
+
+/// Says what topics there are, of which columns may be named.
+fn list(topics: &TopicList, arguments: &InspectArguments) -> Result<(), Failure> {
+    if arguments.html.is_some() {
+        return Err(Failure::usage(
+            "--html draws columns, and the log has topics with clocks of their own: name columns with --input and --output",
+        ));
+    }
+    let text = match arguments.format {
+        FormatArgument::Json => topics.to_json().map_err(|error| Failure::data(error.to_string()))?,
+        FormatArgument::Table => summary::topics(topics, width(arguments)),
+    };
+    output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
+}
+
+/// What goes into a file does not depend on the terminal.
+fn width(arguments: &InspectArguments) -> usize {
+    if arguments.out == Path::new("-") { stdout_width() } else { WIDTH }
 }
 
 /// What inspections of many logs have in common, in words that differ where they do.
@@ -70,11 +93,22 @@ pub(crate) fn inspected(
     job: &InspectJob,
     arguments: &InspectArguments,
 ) -> Result<(Inspection, Option<Recording>), Failure> {
-    let (mut inspection, words, kept) = if arguments.stream {
-        let (inspection, words) = in_parts(job)?;
-        (inspection, words, None)
-    } else {
-        whole(job, arguments.html.is_some())?
+    let reader = if arguments.stream { None } else { Some(log::open(&job.path, &job.log)?) };
+    inspected_in(job, arguments, reader)
+}
+
+/// The same of a log that is open, or of one that is read part by part.
+fn inspected_in(
+    job: &InspectJob,
+    arguments: &InspectArguments,
+    reader: Option<Reader>,
+) -> Result<(Inspection, Option<Recording>), Failure> {
+    let (mut inspection, words, kept) = match reader {
+        Some(reader) => whole(reader, job, arguments.html.is_some())?,
+        None => {
+            let (inspection, words) = in_parts(job)?;
+            (inspection, words, None)
+        }
     };
     inspection.findings.splice(0..0, words.into_iter().map(Finding::reading));
     inspection.command = job.command(arguments, &inspection);
@@ -82,16 +116,29 @@ pub(crate) fn inspected(
 }
 
 /// The inspection of a log that is read whole, what the reader should know of how it was read, and what was read, if it is wanted.
-fn whole(job: &InspectJob, keeps: bool) -> Result<(Inspection, Vec<String>, Option<Recording>), Failure> {
+fn whole(
+    reader: Reader,
+    job: &InspectJob,
+    keeps: bool,
+) -> Result<(Inspection, Vec<String>, Option<Recording>), Failure> {
     let mut chosen = Chosen::default();
-    let Recorded { recording, source, lines, mut words } = log::record(&job.path, &job.log, |reader| {
-        chosen = Chosen::new(job, reader)?;
-        Ok(chosen.columns.clone())
-    })?;
+    let Recorded { recording, source, lines, mut words } =
+        log::record(reader, &job.path, &job.log, |reader| {
+            chosen = Chosen::new(job, reader)?;
+            Ok(chosen.columns.clone())
+        })?;
     words.append(&mut chosen.words);
     let kept = keeps.then(|| recording.clone());
-    let inspection = thetahat::inspect::inspect(recording, &source, &chosen.plan(job))
-        .map_err(log::at_line(&source.file, &lines))?;
+    let mut plan = chosen.plan(job);
+    // Topics are on one clock already.
+    if source.resampled.is_some() {
+        plan.resample = None;
+    }
+    let inspected = thetahat::inspect::inspect(recording, &source, &plan);
+    let mut inspection = inspected.map_err(log::at_line(&source.file, &lines))?;
+    if source.resampled.is_some() {
+        inspection.log.resampled = source.resampled;
+    }
     Ok((inspection, words, kept))
 }
 
@@ -141,6 +188,12 @@ impl Chosen {
     /// The named columns; without names all that hold numbers. Their roles are those that a fit would give them.
     fn new(job: &InspectJob, reader: &Reader) -> Result<Self, Failure> {
         let mut chosen = Self::default();
+        if reader.topics().is_some() && !job.is_named() {
+            let file = job.path.display();
+            return Err(Failure::data(format!(
+                "{file}: of topics with clocks of their own the columns that are named are inspected (--input, --output)"
+            )));
+        }
         let readable = chosen.readable(job, reader);
         let usual = |name: &str| readable.iter().find(|other| *other == name).cloned();
         chosen.output = job.output.clone().or_else(|| usual("y"));

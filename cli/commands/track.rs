@@ -111,7 +111,7 @@ impl<'a> Run<'a> {
         })?;
         let channels = chosen.unwrap_or_default();
         let trackers = job.trackers(&channels.inputs, &channels.outputs, report)?;
-        let has_clock = matches!(job.log.clock, Clock::Column { .. });
+        let has_clock = stream.is_of_a_topic() || matches!(job.log.clock, Clock::Column { .. });
         let setting = state::setting(job, &channels, &trackers);
         let resumed = stored.is_some();
         let state = match stored {

@@ -55,8 +55,11 @@ impl InspectJob {
         let mut option = |name: &str, value: &str| words.push(assigned(name, value));
         match (&self.log.clock, &inspection.log.time) {
             (Clock::Fixed(seconds), _) => option("--sample-time", &seconds.to_string()),
-            (_, Some(name)) => {
-                option("--time", name);
+            // The clock of a topic has no name.
+            (_, name) if inspection.clock.measured => {
+                if let Some(name) = name {
+                    option("--time", name);
+                }
                 let clock = &inspection.clock;
                 match (&arguments.clock.resample, &inspection.log.resampled) {
                     (Some(asked), _) => option("--resample", asked),
@@ -67,7 +70,7 @@ impl InspectJob {
                     (None, None) => {}
                 }
             }
-            (_, None) => {}
+            _ => {}
         }
         if let Some(format) = &arguments.clock.time_format {
             option("--time-format", format);

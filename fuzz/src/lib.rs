@@ -16,7 +16,7 @@ use thetahat::data::{Channel, Log};
 use thetahat::design::ExperimentDesign;
 use thetahat::export::{Language, Plan, Precision, Purpose, export, export_controller};
 use thetahat::filter::{Estimator, FilterSummary, StateFilter, StateModel};
-use thetahat::inspect::Inspection;
+use thetahat::inspect::{Inspection, TopicList};
 use thetahat::model::{GreyBox, Hold, LinearModel, Model};
 use thetahat::optimize::Search;
 use thetahat::report::{
@@ -55,7 +55,8 @@ fn read(path: &Path, options: &Options) {
     let Ok(reader) = Reader::open(path, options) else { return };
     let words = reader.words();
     let clock = reader.times().first().copied();
-    let time = clock.map(|clock| clock.time).or((words.len() > 1).then_some(0));
+    let has_one = reader.topics().is_none() && words.len() > 1;
+    let time = clock.map(|clock| clock.time).or(has_one.then_some(0));
     let date = clock.and_then(|clock| clock.date);
     let columns = (0..words.len()).filter(|column| ![time, date].contains(&Some(*column)) && !words[*column]);
     let selection = Selection { columns: columns.take(8).collect(), time, date };
@@ -134,6 +135,7 @@ pub fn document(bytes: &[u8]) {
     round::<Comparison>(text);
     round::<ExperimentDesign>(text);
     round::<Inspection>(text);
+    round::<TopicList>(text);
     round::<TrackSummary>(text);
     round::<FilterSummary>(text);
 }

@@ -118,6 +118,14 @@ pub(crate) fn inspect_file(py: Python<'_>, options: Vec<OsString>) -> PyResult<(
     written(py, &found)
 }
 
+/// The topics of a log whose topics have clocks of their own: the document that `thetahat inspect` writes.
+#[pyfunction]
+pub(crate) fn topics(py: Python<'_>, options: Vec<OsString>) -> PyResult<String> {
+    let found = awaited(py, move |_| thetahat_cli::topic_list(&options))?;
+    let found = found.map_err(|failure| error::program(py, &failure))?;
+    found.to_json().map_err(|error| error::batch(py, error))
+}
+
 /// An inspection that was written: the document, and its table.
 #[pyfunction]
 pub(crate) fn inspection(py: Python<'_>, text: &str) -> PyResult<(String, String)> {

@@ -65,6 +65,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect_file, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspection, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::topics, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::step_test, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::sine_test, module)?)?;

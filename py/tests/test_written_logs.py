@@ -82,3 +82,17 @@ def test_dates_come_back(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="sheet 'Data' is read; sheet names another one: Other"):
         log = th.read_log(sheets)
     assert (len(log), log.sample_time) == (120, 10)
+
+
+def test_variables_of_matlab_are_columns(tmp_path: Path) -> None:
+    scipy_io = pytest.importorskip("scipy.io")
+    time = 0.5 * np.arange(20)
+    path = tmp_path / "log.mat"
+    variables = {"t": time, "u": np.sin(time), "y": np.arange(20, dtype=np.int16)[:, None], "Ts": 0.5, "name": "tank"}
+    for compressed in (True, False):
+        scipy_io.savemat(path, variables, do_compression=compressed)
+        with pytest.warns(UserWarning, match=r"left out: (Ts \(1\)|.*: name)"):
+            log = th.read_log(path)
+        assert log.sample_time == 0.5
+        np.testing.assert_array_equal(log["u"], np.sin(time))
+        np.testing.assert_array_equal(log["y"], np.arange(20))

@@ -26,7 +26,7 @@ use super::lines::Lines;
 use super::mailbox::{Event, Mailbox, Message, Waker};
 use super::source::{Bytes, Columnar};
 use super::time::Calendar;
-use super::{Header, Options, Selection, Table};
+use super::{Options, Selection, Table};
 use batches::{Batches, Opened};
 use clock::Clock;
 use values::{Kind, numbers};
@@ -125,7 +125,7 @@ impl ColumnarReader {
         options: &Options,
     ) -> Result<Self, Error> {
         let file = bytes.name().to_owned();
-        if let Some(option) = text_option(options) {
+        if let Some(option) = options.of_texts() {
             return Err(Error::data(
                 &file,
                 None,
@@ -261,22 +261,6 @@ impl ColumnarReader {
     }
 }
 
-/// The option of texts that was given, if there is one.
-fn text_option(options: &Options) -> Option<&'static str> {
-    let given = [
-        ("`delimiter`", options.delimiter.is_some()),
-        ("`decimal-comma`", options.decimal_comma.is_some()),
-        ("`no-header`", options.header == Header::None),
-        ("`header-row`", matches!(options.header, Header::Line(_))),
-        ("`skip-rows`", options.skip_rows > 0),
-        ("`comment`", options.comment.is_some()),
-        ("`missing`", !options.missing.is_empty()),
-        ("`value`", !options.values.is_empty()),
-        ("`encoding`", options.encoding.is_some()),
-    ];
-    given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
-}
-
 /// From batches to columns of numbers.
 struct Conversion {
     columns: Columns,
@@ -383,6 +367,7 @@ impl Conversion {
             time: selection.time.as_ref().map(take),
             start: self.clock.as_ref().and_then(|clock| clock.start.clone()),
             calendar: Calendar::None,
+            clocks: Vec::new(),
             rows: part.rows,
             lines: Lines::default(),
             words: part.words,

@@ -1,14 +1,18 @@
 //! Logs of all formats, behind one front.
 
-#[cfg(feature = "spreadsheets")]
+#[cfg(any(feature = "matlab", feature = "spreadsheets"))]
 use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::path::Path;
 
+#[cfg(feature = "matlab")]
+use super::Header;
 use super::error::Error;
 use super::mailbox::{Event, Waker};
+#[cfg(feature = "matlab")]
+use super::matlab::{self, Variables};
 use super::reader::{SIZES, TextReader};
-#[cfg(any(feature = "columnar", feature = "spreadsheets"))]
+#[cfg(any(feature = "columnar", feature = "flight-logs", feature = "matlab", feature = "spreadsheets"))]
 use super::source::Format;
 use super::source::{Bytes, Source};
 #[cfg(feature = "spreadsheets")]
@@ -16,10 +20,12 @@ use super::spreadsheet::{self, Sheet};
 use super::stream::TextStream;
 use super::time::Calendar;
 use super::zone::Zone;
-use super::{ClockColumns, Options, Selection, Table};
+use super::{ClockColumns, Options, Selection, Table, Topic};
 
 #[cfg(feature = "columnar")]
 use super::columnar::{ColumnarReader, ColumnarStream};
+#[cfg(feature = "flight-logs")]
+use super::topics::{TopicStream, TopicsReader};
 
 /// A log whose columns are known and whose rows are still to be read.
 pub struct Reader {
@@ -34,24 +40,26 @@ pub(super) enum AnyReader {
     Text(Box<TextReader>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarReader>),
+    #[cfg(feature = "flight-logs")]
+    Topics(Box<TopicsReader>),
 }
 
 impl Reader {
     /// Opens a log, or standard input for `-`, and reads as far as its first row.
     pub fn open(path: &Path, options: &Options) -> Result<Self, Error> {
-        Self::begin(path, options, |source| TextReader::start(source, options, SIZES))
+        Self::begin(path, options, |source, options| TextReader::start(source, options, SIZES))
     }
 
     /// Opens a log as [`open`](Reader::open) does, without asking for more than it takes to know its columns: it may be
     /// a pipe on which the next row is yet to come. For [`stream`](Reader::stream).
     pub fn open_live(path: &Path, options: &Options) -> Result<Self, Error> {
-        Self::begin(path, options, |source| TextReader::start_live(source, options))
+        Self::begin(path, options, TextReader::start_live)
     }
 
     fn begin(
         path: &Path,
         options: &Options,
-        text: impl FnOnce(Source) -> Result<TextReader, Error>,
+        text: impl FnOnce(Source, &Options) -> Result<TextReader, Error>,
     ) -> Result<Self, Error> {
         options.check().map_err(|message| Error::data(&path.display().to_string(), None, message))?;
         let bytes = Bytes::open(path)?;
@@ -63,24 +71,45 @@ impl Reader {
                 let Sheet { text: cells, words } = spreadsheet::read(bytes, options)?;
                 let total = Some(cells.len() as u64);
                 let cells = Bytes::new(&file, Cursor::new(cells), total)?;
-                let mut reader = text(Source::new(cells, None))?;
+                let mut reader = text(Source::new(cells, None), options)?;
                 reader.tell(&words);
                 Ok(AnyReader::Text(Box::new(reader)))
             }
             _ if options.sheet.is_some() => {
                 Err(Error::data(&file, None, "`sheet` is for spreadsheets, and this is none; leave it out"))
             }
-            None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding))?))),
+            None => Ok(AnyReader::Text(Box::new(text(Source::new(bytes, options.encoding), options)?))),
             #[cfg(feature = "columnar")]
             Some(Format::Columnar(format)) => {
                 Ok(AnyReader::Columnar(Box::new(ColumnarReader::open(path, bytes, format, options)?)))
             }
-            #[cfg(not(all(feature = "columnar", feature = "spreadsheets")))]
+            #[cfg(feature = "matlab")]
+            Some(Format::Matlab) => {
+                let Variables { text: rows, words } = matlab::read(bytes, options)?;
+                let total = Some(rows.len() as u64);
+                let rows = Bytes::new(&file, Cursor::new(rows), total)?;
+                // How it is written is known.
+                let (header, delimiter, decimal_comma) = (Header::Line(1), Some(b'\t'), Some(false));
+                let options = Options { header, delimiter, decimal_comma, ..options.clone() };
+                let mut reader = text(Source::new(rows, None), &options)?;
+                reader.tell(&words);
+                Ok(AnyReader::Text(Box::new(reader)))
+            }
+            #[cfg(feature = "flight-logs")]
+            Some(Format::Topical(format)) => {
+                Ok(AnyReader::Topics(Box::new(TopicsReader::open(bytes, format, options)?)))
+            }
+            #[cfg(not(all(
+                feature = "columnar",
+                feature = "flight-logs",
+                feature = "matlab",
+                feature = "spreadsheets"
+            )))]
             Some(_) => Err(Error::data(
                 bytes.name(),
                 None,
-                "is in a format that this program was built without; build it with the features columnar and spreadsheets, or \
-                 write CSV",
+                "is in a format that this program was built without; build it with the features columnar, flight-logs, matlab and \
+                 spreadsheets, or write CSV",
             )),
         };
         Ok(Self { any: any?, file, zone })
@@ -98,6 +127,26 @@ impl Reader {
             AnyReader::Text(reader) => reader.names(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.names(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.names(),
+        }
+    }
+
+    /// The topics of a log of which each topic has a clock of its own; none of any other log.
+    pub fn topics(&self) -> Option<&[Topic]> {
+        match &self.any {
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => Some(reader.topics()),
+            _ => None,
+        }
+    }
+
+    /// What is not as it should be with the topics of a log, and what of it is not read, in plain words.
+    pub fn remarks(&self) -> Vec<String> {
+        match &self.any {
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.remarks(),
+            _ => Vec::new(),
         }
     }
 
@@ -108,6 +157,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.words(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.words(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => vec![false; reader.names().len()],
         }
     }
 
@@ -117,6 +168,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.nameless().collect(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(_) => Vec::new(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -128,6 +181,8 @@ impl Reader {
             AnyReader::Columnar(reader) => {
                 reader.times().into_iter().map(|time| ClockColumns { time, date: None }).collect()
             }
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -137,6 +192,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.called_clocks(),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(_) => Vec::new(),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(_) => Vec::new(),
         }
     }
 
@@ -183,6 +240,8 @@ impl Reader {
             AnyReader::Text(reader) => reader.read_parts(selection, most, progress, &mut take),
             #[cfg(feature = "columnar")]
             AnyReader::Columnar(reader) => reader.read_parts(selection, most, progress, &mut take),
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => reader.read_parts(selection, most, progress, &mut take),
         };
         read.and(failed.map_or(Ok(()), Err))
     }
@@ -204,6 +263,8 @@ impl Reader {
             AnyReader::Columnar(reader) => {
                 Ok(Stream(AnyStream::Columnar(Box::new(reader.stream(selection, start)?))))
             }
+            #[cfg(feature = "flight-logs")]
+            AnyReader::Topics(reader) => Ok(Stream(AnyStream::Topics(Box::new(reader.stream(selection)?)))),
         }
     }
 }
@@ -215,6 +276,8 @@ enum AnyStream {
     Text(Box<TextStream>),
     #[cfg(feature = "columnar")]
     Columnar(Box<ColumnarStream>),
+    #[cfg(feature = "flight-logs")]
+    Topics(Box<TopicStream>),
 }
 
 impl Stream {
@@ -224,6 +287,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.waker(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.waker(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.waker(),
         }
     }
 
@@ -233,6 +298,17 @@ impl Stream {
             AnyStream::Text(stream) => stream.start(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.start(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => None,
+        }
+    }
+
+    /// Whether its rows are those of a topic, which have a time each, also where none is selected.
+    pub fn is_of_a_topic(&self) -> bool {
+        match &self.0 {
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => true,
+            _ => false,
         }
     }
 
@@ -242,6 +318,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.values(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.values(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.values(),
         }
     }
 
@@ -251,6 +329,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.time(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.time(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.time(),
         }
     }
 
@@ -260,6 +340,8 @@ impl Stream {
             AnyStream::Text(stream) => format!("{file}:{}", stream.line()),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => format!("{file}: row {}", stream.row()),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => format!("{file}: row {}", stream.row()),
         }
     }
 
@@ -269,6 +351,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.is_unfinished(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(_) => false,
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(_) => false,
         }
     }
 
@@ -278,6 +362,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.words(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.words(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.words(),
         }
     }
 
@@ -290,6 +376,8 @@ impl Stream {
             AnyStream::Text(stream) => stream.next(),
             #[cfg(feature = "columnar")]
             AnyStream::Columnar(stream) => stream.next(),
+            #[cfg(feature = "flight-logs")]
+            AnyStream::Topics(stream) => stream.next(),
         }
     }
 }

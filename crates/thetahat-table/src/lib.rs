@@ -1,4 +1,6 @@
-//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, Parquet, and Arrow IPC files and streams.
+//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files and
+//! streams; and logs of flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash (ArduPilot) and WPILib
+//! data logs.
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
 //! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks
@@ -32,6 +34,9 @@
 //! and percent signs; words for off and on, and for missing values; gzip; UTF-16 with a byte-order mark. Other encodings by name;
 //! times as seconds, as ISO 8601 or in a given format.
 //!
+//! The columns of a log of topics are called `topic.field`, and [`Reader::topics`] lists them. Columns of one topic are a table like
+//! any other; of columns of several topics each has its clock in [`Table::clocks`].
+//!
 //! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call it:
 //! `decimal-comma`.
 //!
@@ -50,6 +55,8 @@ mod formats;
 mod layout;
 mod lines;
 mod mailbox;
+#[cfg(feature = "matlab")]
+mod matlab;
 mod memory;
 mod names;
 mod names_of_times;
@@ -65,6 +72,8 @@ mod stream;
 #[cfg(test)]
 mod tests;
 mod time;
+#[cfg(feature = "flight-logs")]
+mod topics;
 mod words;
 mod zone;
 
@@ -75,6 +84,8 @@ pub use mailbox::{Event, Waker};
 pub use memory::Bound;
 pub use names::{list, names};
 pub use time::{Calendar, Unit};
+
+use std::ops::Range;
 
 /// Where a log has the names of its columns.
 #[derive(Clone, Copy, Debug, Default, Eq, PartialEq)]
@@ -145,6 +156,47 @@ impl Options {
             _ => self.time_zone.as_deref().map_or(Ok(()), |name| zone::Zone::of(name).map(drop)),
         }
     }
+
+    /// The option of texts that was given, if there is one.
+    #[cfg(any(feature = "columnar", feature = "flight-logs", feature = "matlab"))]
+    fn of_texts(&self) -> Option<&'static str> {
+        let given = [
+            ("`delimiter`", self.delimiter.is_some()),
+            ("`decimal-comma`", self.decimal_comma.is_some()),
+            ("`no-header`", self.header == Header::None),
+            ("`header-row`", matches!(self.header, Header::Line(_))),
+            ("`skip-rows`", self.skip_rows > 0),
+            ("`comment`", self.comment.is_some()),
+            ("`missing`", !self.missing.is_empty()),
+            ("`value`", !self.values.is_empty()),
+            ("`encoding`", self.encoding.is_some()),
+        ];
+        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+}
+
+/// A topic of a log of which each topic has a clock of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Topic {
+    /// Its name.
+    pub name: String,
+    /// How many messages it has.
+    pub rows: usize,
+    /// Seconds from the first message to the last.
+    pub duration: f64,
+    /// Its columns, among all of the log.
+    pub columns: Range<usize>,
+}
+
+/// The clock of the columns of a topic.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnClock {
+    /// The topic's name.
+    pub topic: String,
+    /// The times in seconds, rising, of a clock that all topics of the log share.
+    pub time: Vec<f64>,
+    /// Which of the selected columns these are.
+    pub columns: Vec<usize>,
 }
 
 /// Which columns to read, by their indices, each at most once.
@@ -192,7 +244,9 @@ pub struct Table {
     pub start: Option<String>,
     /// What the times are besides seconds.
     pub calendar: Calendar,
-    /// The number of rows.
+    /// The clocks of columns of several topics, which are then not all as long, and `time` is none; nothing otherwise.
+    pub clocks: Vec<OwnClock>,
+    /// The number of rows; of columns of several topics that of the longest.
     pub rows: usize,
     /// The line on which each row is; nothing where there are no lines.
     pub lines: Lines,

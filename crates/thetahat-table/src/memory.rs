@@ -18,7 +18,7 @@ impl Bound {
         Self { per_value, free: free() }
     }
 
-    #[cfg(all(test, feature = "columnar"))]
+    #[cfg(all(test, any(feature = "columnar", feature = "flight-logs")))]
     pub(crate) fn of(per_value: u64, free: u64) -> Self {
         Self { per_value, free: Some(free) }
     }
@@ -40,6 +40,13 @@ impl Bound {
     pub(crate) fn passed_by_bytes(&self, bytes: u64) -> Option<String> {
         let free = self.free.filter(|free| bytes > *free)?;
         Some(format!("one of its batches takes {} unpacked, and {} are free", said(bytes), said(free)))
+    }
+
+    /// What a file of this many bytes takes that is held while it is read, in words, if it is more than there is.
+    #[cfg(any(feature = "flight-logs", feature = "matlab"))]
+    pub(crate) fn passed_by_file(&self, bytes: u64) -> Option<String> {
+        let free = self.free.filter(|free| bytes > *free)?;
+        Some(format!("the file has more than {} unpacked, and {} are free", said(bytes), said(free)))
     }
 }
 

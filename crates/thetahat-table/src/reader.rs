@@ -221,7 +221,7 @@ impl TextReader {
     }
 
     /// Further words that the reader should know.
-    #[cfg(feature = "spreadsheets")]
+    #[cfg(any(feature = "matlab", feature = "spreadsheets"))]
     pub(super) fn tell(&mut self, words: &[String]) {
         let words = words.iter().map(|words| self.plan.layout.told(words));
         self.told.splice(0..0, words);

@@ -162,6 +162,7 @@ impl Plan {
             }),
             start: self.times.start.clone(),
             calendar: Calendar::None,
+            clocks: Vec::new(),
             rows: rows.count,
             lines: rows.lines,
             words: Vec::new(),

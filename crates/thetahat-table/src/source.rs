@@ -27,6 +27,30 @@ pub(super) enum Format {
     Columnar(Columnar),
     /// A zip file, as spreadsheets are today, and the container of those before.
     Spreadsheet,
+    /// Variables of MATLAB.
+    Matlab,
+    /// Topics, each with a clock of its own.
+    Topical(Topical),
+}
+
+/// The formats of topics.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub(super) enum Topical {
+    Ulog,
+    DataFlash,
+    WpiLog,
+}
+
+#[cfg(feature = "flight-logs")]
+impl Topical {
+    /// What messages call such a file.
+    pub(super) fn said(self) -> &'static str {
+        match self {
+            Self::Ulog => "an ULog",
+            Self::DataFlash => "a DataFlash log",
+            Self::WpiLog => "a data log of WPILib",
+        }
+    }
 }
 
 /// The formats of columns of values in binary.
@@ -41,7 +65,7 @@ pub(super) enum Columnar {
 
 impl Format {
     /// The first bytes of each. Those of a stream are the mark before each of its messages, and no text in any encoding.
-    const MARKS: [(&[u8], Self); 7] = [
+    const MARKS: [(&[u8], Self); 12] = [
         (b"PAR1", Self::Columnar(Columnar::Parquet)),
         (b"PARE", Self::Columnar(Columnar::EncryptedParquet)),
         (b"ARROW1", Self::Columnar(Columnar::ArrowFile)),
@@ -49,6 +73,12 @@ impl Format {
         (b"FEA1", Self::Columnar(Columnar::Feather1)),
         (b"PK\x03\x04", Self::Spreadsheet),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", Self::Spreadsheet),
+        (b"MATLAB 5.0 MAT-file", Self::Matlab),
+        (b"MATLAB 7.3 MAT-file", Self::Matlab),
+        (b"ULog\x01\x12\x35", Self::Topical(Topical::Ulog)),
+        // A message that declares messages, as the first one does.
+        (b"\xa3\x95\x80", Self::Topical(Topical::DataFlash)),
+        (b"WPILOG", Self::Topical(Topical::WpiLog)),
     ];
 
     /// The format that begins with these bytes.
@@ -132,7 +162,7 @@ impl Bytes {
     }
 
     /// Whether it was unpacked.
-    #[cfg(feature = "columnar")]
+    #[cfg(any(feature = "columnar", feature = "flight-logs"))]
     pub(super) fn is_gzip(&self) -> bool {
         self.gzip
     }
@@ -144,7 +174,7 @@ impl Bytes {
     }
 
     /// The bytes themselves.
-    #[cfg(any(feature = "columnar", feature = "spreadsheets"))]
+    #[cfg(any(feature = "columnar", feature = "flight-logs", feature = "matlab", feature = "spreadsheets"))]
     pub(super) fn into_reader(self) -> Box<dyn Read + Send> {
         self.bytes
     }

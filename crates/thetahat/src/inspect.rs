@@ -5,6 +5,7 @@
 //! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
 //!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output
 //!   ([`Feedback`]). What a careful reader should know of all that is a list of [`Finding`](crate::data::Finding)s.
+//! - A [`TopicList`] says what there is in a log of topics that have clocks of their own.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log, Rows, Source};
@@ -39,6 +40,7 @@ mod saturation;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod topics;
 mod whitening;
 
 pub(crate) use excitation::{excitation, is_few_sinusoids, order_with_mean};
@@ -49,4 +51,5 @@ pub use pieces::PiecewiseInspection;
 pub use plan::InspectionPlan;
 pub(crate) use quantization::quantization;
 pub use run::{inspect, inspect_log};
+pub use topics::{TopicList, TopicSummary};
 pub(crate) use whitening::autoregression;

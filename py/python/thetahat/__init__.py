@@ -1,6 +1,6 @@
 """System identification: models of dynamic systems from logged data.
 
-A log holds measured signals (`Log`, `read_log`, `read_csv`). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
+A log holds measured signals (`Log`, `read_log`, `read_csv`; `topics` lists those of a flight). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
 `fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
@@ -71,6 +71,7 @@ from thetahat._thetahat import (
     WindowedLeastSquares,
     __version__,
 )
+from thetahat._topics import Topic, topics
 from thetahat._track import Tracker
 from thetahat._tracked import Tracked, TrackTrajectory
 from thetahat._tune import Tuning, tune
@@ -133,6 +134,7 @@ __all__ = [
     "StepTest",
     "StepTestOptions",
     "TestSignal",
+    "Topic",
     "TrackTrajectory",
     "Tracked",
     "Tracker",
@@ -172,5 +174,6 @@ __all__ = [
     "ss",
     "step_test",
     "tf",
+    "topics",
     "tune",
 ]

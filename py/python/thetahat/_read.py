@@ -98,7 +98,7 @@ def read_log(
     resample: Resample | None = None,
     uniform: bool = True,
 ) -> Log:
-    """Read a log from a Parquet or an Arrow file, or from CSV, as the command line does.
+    """Read a log from a Parquet or an Arrow file, from the log of a flight or of a robot, or from CSV, as the command line does.
 
     The format is known by the first bytes. Of Parquet and Arrow only the columns that are named are unpacked, batch by batch: memory
     does not hold the file.
@@ -106,8 +106,8 @@ def read_log(
     Parameters
     ----------
     path : str or path, or a sequence of them
-        The file: Parquet, an Arrow file or stream (IPC, Feather 2), or CSV, gzip-compressed or not. Several files are several
-        experiments with one plant.
+        The file: Parquet, an Arrow file or stream (IPC, Feather 2), a ULog, a DataFlash log, a data log of WPILib, a MATLAB file, or CSV,
+        gzip-compressed or not. Several files are several experiments with one plant.
     inputs : sequence of str, or str, optional
         The columns that are inputs: those called u, u1, u2, …, unless said otherwise. An empty one makes a time series.
     output : str or sequence of str, optional
@@ -116,7 +116,8 @@ def read_log(
         The column that holds the times: instants, dates or durations, numbers, or texts of dates. Without it the one column that is a
         clock.
     sample_time, resample
-        As for `Log`.
+        As for `Log`. Columns of several topics (``topic.field``, see `topics`) are put on one clock by `resample`; without it on that of
+        the fastest, where channels that move in steps are held and the others read from straight lines.
     uniform : bool, default True
         Whether the steps of the clock have to be even. Models in equations take any.
 
@@ -139,6 +140,7 @@ def read_log(
     See Also
     --------
     read_csv : With the options of text.
+    topics : What there is in the log of a flight or of a robot.
 
     Examples
     --------

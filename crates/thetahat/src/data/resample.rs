@@ -17,6 +17,8 @@
 //! differential convolution, 1993), and none of them after a gap of the clock. At the end of a log they have about half of
 //! the weight; a row for which they have less than two fifths is missing.
 
+mod one_clock;
+
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -63,6 +65,31 @@ pub struct AntiAlias {
     pub cutoff: f64,
     /// Recorded samples that a filtered one is made of: one and as many before as after it.
     pub taps: usize,
+}
+
+/// How a log was put on another clock.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Resampling {
+    /// Seconds between the new rows.
+    pub step: f64,
+    /// How values between samples were read.
+    pub interpolation: Interpolation,
+    /// The number of rows before.
+    pub rows: usize,
+    /// The filter that took out what the new clock cannot show; none where it does not apply, or was not wanted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub anti_alias: Option<AntiAlias>,
+}
+
+impl Resampling {
+    /// What becomes of a log with these times.
+    ///
+    /// # Errors
+    /// As for [`Resample::filter_for`].
+    pub fn new(how: &Resample, time: &[f64]) -> Result<Self, Error> {
+        let Resample { step, interpolation, .. } = *how;
+        Ok(Self { step, interpolation, rows: time.len(), anti_alias: how.filter_for(time)? })
+    }
 }
 
 impl Resample {
@@ -240,17 +267,30 @@ impl Log {
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn resampled(channels: Vec<Channel>, time: &[f64], how: &Resample) -> Result<Self, Error> {
-        let Resample { step, interpolation, .. } = *how;
-        if !(step.is_finite() && step > 0.0) {
-            return Err(Error::argument("resample", format!("{step} is not a positive number of seconds")));
-        }
         let rows = check(&channels)?;
-        let recorded = median_step(time, rows)?;
+        median_step(time, rows)?;
         let (Some(first), Some(last)) = (time.first(), time.last()) else {
             return Err(Error::data("the log has no rows"));
         };
-        // Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970
-        // have seven decimals).
+        let grid = Grid::new(*first, *last, how.step, rows)?;
+        let channels = grid.read(channels, time, how)?;
+        Ok(Self::on_clock(channels, grid.instants, how.step))
+    }
+}
+
+/// The instants of a uniform clock at which logs are read.
+struct Grid {
+    instants: Vec<f64>,
+    /// Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970 have seven decimals).
+    rounding: f64,
+}
+
+impl Grid {
+    /// Every `step` seconds, of a log with so many rows.
+    fn new(first: f64, last: f64, step: f64, rows: usize) -> Result<Self, Error> {
+        if !(step.is_finite() && step > 0.0) {
+            return Err(Error::argument("resample", format!("{step} is not a positive number of seconds")));
+        }
         let rounding = 5e-7 * step + 2.0 * f64::EPSILON * first.abs().max(last.abs());
         let count = ((last - first + rounding) / step).floor() + 1.0;
         if count > MOST_ROWS {
@@ -265,7 +305,15 @@ impl Log {
                 format!("a step of {step} s leaves one row of a log of {whole} s; take a shorter one");
             return Err(Error::argument("resample", message));
         }
-        let instants: Vec<f64> = (0..count as usize).map(|k| first + k as f64 * step).collect();
+        Ok(Self { instants: (0..count as usize).map(|k| first + k as f64 * step).collect(), rounding })
+    }
+
+    /// The values of channels at these instants, of which the first is not before the first of their times.
+    fn read(&self, channels: Vec<Channel>, time: &[f64], how: &Resample) -> Result<Vec<Channel>, Error> {
+        let Self { instants, rounding } = self;
+        let rows = check(&channels)?;
+        let recorded = median_step(time, rows)?;
+        let interpolation = how.interpolation;
         // The last sample at or before each instant.
         let places: Vec<usize> = instants
             .iter()
@@ -285,7 +333,7 @@ impl Log {
             Interpolation::Hold | Interpolation::Linear => f64::INFINITY,
         };
         let in_gap = |instant: f64, left: usize| {
-            instant - time[left] > rounding && time.get(left + 1).is_some_and(|next| next - time[left] > gap)
+            instant - time[left] > *rounding && time.get(left + 1).is_some_and(|next| next - time[left] > gap)
         };
         let values = |channel: &Channel| -> Vec<f64> {
             let own = &channel.values;
@@ -298,7 +346,7 @@ impl Log {
                 return read().map(value).collect();
             };
             let value = |(instant, left): (f64, usize)| {
-                let late = instant - time[left] > rounding;
+                let late = instant - time[left] > *rounding;
                 if late && instant - time[left] > GAP * recorded {
                     return f64::NAN;
                 }
@@ -313,8 +361,7 @@ impl Log {
         };
         let values: Vec<Vec<f64>> = channels.par_iter().map(values).collect();
         let channels = channels.into_iter().zip(values);
-        let channels = channels.map(|(channel, values)| Channel { name: channel.name, values }).collect();
-        Ok(Self::on_clock(channels, instants, step))
+        Ok(channels.map(|(channel, values)| Channel { name: channel.name, values }).collect())
     }
 }
 

@@ -6,8 +6,7 @@ use jiff::fmt::temporal::Pieces;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{AntiAlias, Interpolation, Resample, Rows};
-use crate::Error;
+use super::{Resampling, Rows};
 
 /// Where a log came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -80,30 +79,5 @@ impl<'t> Start<'t> {
             None => "",
         };
         Some(Self { wall, zone })
-    }
-}
-
-/// How a log was put on another clock.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Resampling {
-    /// Seconds between the new rows.
-    pub step: f64,
-    /// How values between samples were read.
-    pub interpolation: Interpolation,
-    /// The number of rows before.
-    pub rows: usize,
-    /// The filter that took out what the new clock cannot show; none where it does not apply, or was not wanted.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub anti_alias: Option<AntiAlias>,
-}
-
-impl Resampling {
-    /// What becomes of a log with these times.
-    ///
-    /// # Errors
-    /// As for [`Resample::filter_for`].
-    pub fn new(how: &Resample, time: &[f64]) -> Result<Self, Error> {
-        let Resample { step, interpolation, .. } = *how;
-        Ok(Self { step, interpolation, rows: time.len(), anti_alias: how.filter_for(time)? })
     }
 }

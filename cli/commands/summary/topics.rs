@@ -1,0 +1,77 @@
+//! The topics of a log as a table for people.
+
+use thetahat::figures::short;
+use thetahat::inspect::{TopicList, TopicSummary};
+use thetahat::text::harmless;
+
+use super::text::{Text, columns};
+
+/// The topics with their rates, their fields, the warnings, and what to type next, this many columns wide.
+pub fn topics(list: &TopicList, width: usize) -> String {
+    let mut text = Text::new(width);
+    let file = harmless(&list.file);
+    text.line(&format!("{file}: {} topics, each with a clock of its own", list.topics.len()));
+    text.line("");
+    let names = ["topic", "rows", "rate [Hz]", "duration [s]", "columns"];
+    let mut table = columns(&names).none("there is a single message, or all have the same time");
+    for topic in &list.topics {
+        let rate = topic.rate.map_or("-".to_owned(), short);
+        let count = topic.columns.len().to_string();
+        table.row([topic.name.clone(), topic.rows.to_string(), rate, short(topic.duration), count]);
+    }
+    text.table(table);
+    for topic in list.topics.iter().filter(|topic| topic.columns.len() > 1 || topic.columns[0] != topic.name)
+    {
+        text.line(&format!("{}: {}", harmless(&topic.name), harmless(&fields(topic).join(", "))));
+    }
+    text.line("");
+    for warning in &list.warnings {
+        text.line(&format!("warning: {}", harmless(warning)));
+    }
+    if !list.warnings.is_empty() {
+        text.line("");
+    }
+    if let Some(command) = &list.command {
+        text.verbatim(&harmless(command));
+    }
+    text.finish()
+}
+
+/// The columns as they are called within the topic; arrays in short.
+fn fields(topic: &TopicSummary) -> Vec<String> {
+    let mut fields: Vec<String> = Vec::new();
+    // The name of the array at hand, and its last element.
+    let mut array: Option<(&str, usize)> = None;
+    for column in &topic.columns {
+        let field =
+            column.strip_prefix(&topic.name).map_or(column.as_str(), |field| field.trim_start_matches('.'));
+        let element = field.strip_suffix(']').and_then(|field| field.rsplit_once('['));
+        let element = element.and_then(|(name, index)| Some((name, index.parse::<usize>().ok()?)));
+        match (element, &mut array, fields.last_mut()) {
+            (Some((name, index)), Some((known, last)), Some(shown))
+                if name == *known && index == *last + 1 =>
+            {
+                *last = index;
+                *shown = format!("{name}[0..{index}]");
+            }
+            (element, array, _) => {
+                *array = element.filter(|(_, index)| *index == 0);
+                fields.push(field.to_owned());
+            }
+        }
+    }
+    fields
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_are_shown_in_short() {
+        let columns = ["a.x", "a.q[0]", "a.q[1]", "a.q[2]", "a.esc[0].rpm", "a.esc[1].rpm", "a.r[0]", "a.z"];
+        let columns = columns.iter().map(|&name| name.to_owned()).collect();
+        let topic = TopicSummary { name: "a".into(), rows: 2, rate: None, duration: 0.0, columns };
+        assert_eq!(fields(&topic), ["x", "q[0..2]", "esc[0].rpm", "esc[1].rpm", "r[0]", "z"]);
+    }
+}

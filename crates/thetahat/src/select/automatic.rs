@@ -15,7 +15,7 @@ use crate::Error;
 use crate::data::{Decision, FindingKind, Record};
 use crate::estimate::{Initial, pays, stretches};
 use crate::model::{Orders, Structure};
-use crate::validate::feedback::feedback;
+use crate::validate::feedback::{Loop, feedback};
 
 /// The highest order of ARX and AR models, and of the others.
 const LONGEST: usize = 10;
@@ -58,13 +58,15 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
             ),
         ));
     }
-    let follows = followers(task);
+    let loops = loops(task);
+    let follows = loops.certain();
     let closed = automatic.structure.is_none() && task.focus == Focus::Auto && follows.contains(&true);
     let task = &if closed { Task { focus: Focus::Prediction, ..*task } } else { *task };
     let structures = structures(task, automatic, closed)?;
     let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));
     let mut steps = Vec::new();
-    let decisions = if closed { vec![in_closed_loop(task, &follows)] } else { Vec::new() };
+    let decided = closed || automatic.nk.is_none() && follows.contains(&true);
+    let decisions = if decided { vec![in_closed_loop(task, &follows, closed)] } else { Vec::new() };
     let (delays, nk) = match &automatic.nk {
         Some(nk) if nk.len() == inputs => (Vec::new(), nk.clone()),
         Some(nk) => {
@@ -73,7 +75,7 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
                 format!("there are {} values for {inputs} inputs; give one for each", nk.len()),
             ));
         }
-        None if driven => delay::found(task, &follows, &mut steps)?,
+        None if driven => delay::found(task, &loops, &mut steps)?,
         None => (Vec::new(), vec![1; inputs]),
     };
     let mut models = candidates(task.estimation, &structures, &nk)?;
@@ -84,7 +86,8 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
         steps.push(format!("Models without {} compete, as no effect is seen.", names.join(", ")));
     }
     if task.looks_further() && automatic.nk.is_none() {
-        for delay in [1, 0] {
+        let least = usize::from(follows.contains(&true));
+        for delay in (least..=1).rev() {
             models.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
         }
     }
@@ -102,15 +105,15 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, guess })
 }
 
-/// Which inputs follow the output beyond doubt.
-fn followers(task: &Task<'_>) -> Vec<bool> {
+/// What tells of a loop.
+fn loops(task: &Task<'_>) -> Loop {
     let few = stretches(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
     let record = few.as_ref().unwrap_or(task.estimation);
-    feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments).certain()
+    feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments)
 }
 
 /// What feedback means for the choice.
-fn in_closed_loop(task: &Task<'_>, follows: &[bool]) -> Decision {
+fn in_closed_loop(task: &Task<'_>, follows: &[bool], is_open: bool) -> Decision {
     let names =
         task.inputs.iter().zip(follows).filter(|(_, follows)| **follows).map(|(name, _)| name.clone());
     let channels: Vec<String> = names.collect();
@@ -124,11 +127,14 @@ fn in_closed_loop(task: &Task<'_>, follows: &[bool]) -> Decision {
             "{input} '{}' {follow} past errors of the output, as in a closed loop",
             channels.join("', '")
         ),
-        did: format!(
-            "{they} one sample later at the earliest, models with noise of their own compete (ARX, ARMAX, Box-Jenkins), and errors one \
-             step ahead decide"
-        ),
-        instead: "`model` or `focus`".to_owned(),
+        did: match is_open {
+            true => format!(
+                "{they} one sample later at the earliest, models with noise of their own compete (ARX, ARMAX, Box-Jenkins), and errors one \
+                 step ahead decide"
+            ),
+            false => format!("{they} one sample later at the earliest"),
+        },
+        instead: if is_open { "`model` or `focus`" } else { "`nk`" }.to_owned(),
         channels,
     }
 }

@@ -29,6 +29,7 @@ use crate::data::Record;
 use crate::estimate::InformationCriterion;
 use crate::figures::fixed;
 use crate::model::Orders;
+use crate::validate::feedback::Loop;
 
 /// Orders of the models: na, and input lags.
 const DELAY_ORDER: usize = 10;
@@ -260,10 +261,10 @@ fn found_in(data: &Data<'_>, names: &[String]) -> Result<Vec<Delay>, Error> {
 /// The delays, and what there is to say of them.
 pub(super) fn found(
     task: &Task<'_>,
-    follows: &[bool],
+    loops: &Loop,
     steps: &mut Vec<String>,
 ) -> Result<(Vec<Delay>, Vec<usize>), Error> {
-    let delays = delays(task.estimation, task.inputs, follows)?;
+    let delays = delays(task.estimation, task.inputs, &loops.certain())?;
     if delays.is_empty() {
         steps.push("Too few samples to find delays: they were taken to be 1.".to_owned());
         return Ok((delays, vec![1; task.inputs.len()]));
@@ -286,8 +287,16 @@ pub(super) fn found(
             percent(*confidence)
         ));
     }
-    for Delay { input: name, .. } in delays.iter().filter(|of| of.nk == 0 && of.confidence.is_some()) {
-        steps.push(format!("{name} and the output go together at once: it acts within the same sample."));
+    let at_once = delays.iter().zip(&loops.inputs).filter(|(of, _)| of.nk == 0 && of.confidence.is_some());
+    for (Delay { input: name, .. }, feedback) in at_once {
+        steps.push(if feedback.is_some_and(|feedback| feedback.is_suspected()) {
+            format!(
+                "{name} and the output go together at once, and past errors of the output predict {name}: that may be feedback; `nk` 1 keeps \
+                 it out."
+            )
+        } else {
+            format!("{name} and the output go together at once: it acts within the same sample.")
+        });
     }
     let nk = delays.iter().map(|delay| delay.nk).collect();
     Ok((delays, nk))

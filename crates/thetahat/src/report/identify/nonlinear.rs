@@ -21,6 +21,8 @@ use crate::select::{HeldOut, SelectedModel, Selection, Task, few_for_blocks, on_
 /// Lags that are always tried, and the most of each channel.
 const USUAL_LAGS: [usize; 2] = [2, 3];
 const MOST_LAGS: usize = 4;
+/// The best sets of lags are looked at further.
+const BEST: usize = 3;
 /// Products help that lower the mean of the logarithms of free runs by so much.
 const HELPS: f64 = 0.1;
 /// Units of a network, its further starts and iterations, and the samples that weigh for small numbers.
@@ -137,24 +139,25 @@ impl<'l> Nonlinear<'l> {
             if few { run(plan, format!("products of degree {degree}")) } else { None }
         };
         let better = |one: &Rival, other: &Rival| one.seen.both().total_cmp(&other.seen.both());
-        let lags = self.lags(selection);
-        let Some(squares) = lags.iter().filter_map(|plan| of_degree(plan, 2)).min_by(better) else {
-            return Vec::new();
-        };
-        let cubes = of_degree(&squares.plan, 3);
+        let mut squares: Vec<Rival> =
+            self.lags(selection).iter().filter_map(|plan| of_degree(plan, 2)).collect();
+        squares.sort_by(better);
+        squares.truncate(BEST);
+        let Some(first) = squares.first() else { return Vec::new() };
+        let cubes = of_degree(&first.plan, 3);
         // A network is worth its training where products simulate better than none, found in the same way.
         let least = |rival: Option<&Rival>| rival.map_or(f64::INFINITY, |rival| rival.seen.both());
-        let straight = least(of_degree(&squares.plan, 1).as_ref());
-        let helps = straight - least(Some(&squares)).min(least(cubes.as_ref())) > HELPS;
+        let straight = least(of_degree(&first.plan, 1).as_ref());
+        let helps = straight - least(Some(first)).min(least(cubes.as_ref())) > HELPS;
         let trained = helps && samples(&whole) <= MOST_TRAINED;
-        let networks = lags.iter().filter(|_| trained).filter_map(|plan| {
+        let networks = squares.iter().filter(|_| trained).filter_map(|Rival { plan, .. }| {
             let map = MapPlan::Network { activation: Activation::Tanh, units: Some(UNITS), drawn: false };
             let search = Search { starts: STARTS, max_iterations: ITERATIONS, ..plan.search.clone() };
             let plan = NonlinearArxPlan { map, ridge: Some(RIDGE), search, ..plan.clone() };
             run(plan, format!("a network of {UNITS} units"))
         });
         let networks: Vec<Rival> = networks.collect();
-        let mut rivals: Vec<Rival> = [Some(squares), cubes].into_iter().flatten().chain(networks).collect();
+        let mut rivals: Vec<Rival> = squares.into_iter().chain(cubes).chain(networks).collect();
         rivals.sort_by(better);
         rivals
     }
@@ -237,14 +240,15 @@ impl<'l> Nonlinear<'l> {
 
     /// Plans with the lags that are always tried, and with those of the linear models.
     fn lags(&self, selection: &Selection) -> Vec<NonlinearArxPlan> {
-        // A plant that is not linear may answer sooner than the linear models say.
-        let sooner: Vec<usize> = match &*selection.delays {
+        let own: Vec<usize> = match &*selection.delays {
             [] => selection.chosen.orders.nk.clone(),
-            delays => delays.iter().map(|delay| delay.nk.saturating_sub(1).max(delay.nk.min(1))).collect(),
+            delays => delays.iter().map(|delay| delay.nk).collect(),
         };
-        let of = |lags: usize| NonlinearArxPlan {
+        // A plant that is not linear may answer sooner than linear models say.
+        let sooner: Vec<usize> = own.iter().map(|nk| nk.saturating_sub(1).max((*nk).min(1))).collect();
+        let of = |lags: usize, delays: &[usize]| NonlinearArxPlan {
             output_lags: vec![lags],
-            input_lags: sooner.iter().map(|&delay| InputLags { lags, delay }).collect(),
+            input_lags: delays.iter().map(|&delay| InputLags { lags, delay }).collect(),
             ..self.plan.clone()
         };
         let linear = |orders: &Orders| {
@@ -258,10 +262,11 @@ impl<'l> Nonlinear<'l> {
                 ..self.plan.clone()
             }
         };
-        let chosen = &selection.chosen.orders;
-        let mut plans: Vec<NonlinearArxPlan> = USUAL_LAGS.iter().map(|&lags| of(lags)).collect();
+        let usual = USUAL_LAGS.iter().flat_map(|&lags| [of(lags, &own), of(lags, &sooner)]);
         let winners = selection.winners.iter().map(|winners| &winners.simulation.orders);
-        for plan in std::iter::once(chosen).chain(winners).map(linear) {
+        let linear = std::iter::once(&selection.chosen.orders).chain(winners).map(linear);
+        let mut plans: Vec<NonlinearArxPlan> = Vec::new();
+        for plan in usual.chain(linear) {
             if !plans.contains(&plan) {
                 plans.push(plan);
             }

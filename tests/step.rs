@@ -183,3 +183,33 @@ fn public_logs_without_a_regime_are_refused() {
     let Some(folder) = folder_with_any("heating_system.csv") else { return };
     assert!(folder.refused("step log.csv --time t", 4).contains("step 1 (row 201)"));
 }
+
+#[test]
+fn a_step_that_took_too_long_is_named() {
+    // A knob that is turned by hand, four rows beside a level of 40; and back at once.
+    let mut random = Random::new(6);
+    let u: Vec<f64> = (0..600_u32)
+        .map(|row| match row {
+            0..40 => 1.0,
+            40..44 => 1.0 + 0.5 * f64::from(row - 39),
+            44..300 => 3.0,
+            _ => 1.0,
+        })
+        .collect();
+    let mut state = 1.0;
+    let y: Vec<f64> = u
+        .iter()
+        .map(|u| {
+            let own = state + 0.01 * random.uniform();
+            state += (u - state) / 20.0;
+            own
+        })
+        .collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let run = folder.done("step log.csv --report test.json");
+    assert!(run.stdout.starts_with("log.csv: 1 step of u, response of y\n"), "{}", run.stdout);
+    let document: Value = serde_json::from_str(&folder.read("test.json")).unwrap();
+    let warnings = document["warnings"].to_string();
+    let words = "from row 41 on 'u' goes from 1 to 3 in 3 rows, which is slow beside a level of 40 rows: it is left out";
+    assert!(warnings.contains(words), "{warnings}");
+}

@@ -42,6 +42,7 @@ def test_reports_are_the_same_to_the_byte(folder: Path) -> None:
         "--model=bj --nb=2 --nc=0 --nd=1 --nf=2": th.bj(log, 2, 0, 1, 2, **rows),  # type: ignore[arg-type]
         "--na=1..4 --nb=1..3 --nk=0..2": th.search(log, na=range(1, 5), nb=range(1, 4), nk=range(3), **rows),  # type: ignore[arg-type]
         "": th.search(log, **rows),  # type: ignore[arg-type]
+        "--narx=none": th.fit(log, narx="none", **rows),  # type: ignore[arg-type]
         "--na=2 --nb=2 --method=iv": th.iv(log, 2, 2, **rows),  # type: ignore[arg-type]
         "--na=2 --nb=2 --norm=1 --bound=a1=-1.5..0": th.arx(log, 2, 2, norm=1, bound={"a1": (-1.5, 0)}, **rows),  # type: ignore[arg-type]
         "--na=2 --nb=0": th.arx(log, 2, 0, **rows),  # type: ignore[arg-type]

@@ -582,7 +582,7 @@ def fit(
     --------
     >>> import thetahat as th
     >>> th.fit(th.dc_motor()).kind
-    'armax'
+    'polynomial'
     """
     more = [] if narx is None else [f"--narx={_options.text('narx', narx)}"]
     return _fit(None, locals(), *more)

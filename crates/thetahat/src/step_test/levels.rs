@@ -21,6 +21,14 @@ pub(super) struct Level {
     pub(super) value: f64,
 }
 
+/// What an input does between levels that it holds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Moves {
+    pub(super) steps: Vec<Jump>,
+    /// Those that take too long beside their levels to be steps.
+    pub(super) slow: Vec<Jump>,
+}
+
 /// A step from one level to another.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Jump {
@@ -46,24 +54,25 @@ pub(super) fn noise(input: &[f64]) -> f64 {
 
 /// The steps of an input: from one level to the next, where both are held, are flat, and the way between them is short. What lies between
 /// levels, such as the ramp of an actuator, is part of the step; it counts from the row in which the input leaves the level. O(N).
-pub(super) fn jumps(input: &[f64]) -> Vec<Jump> {
+pub(super) fn moves(input: &[f64]) -> Moves {
     let (low, high) =
         input.iter().fold((f64::MAX, f64::MIN), |(low, high), value| (value.min(low), value.max(high)));
     let tolerance = (NOISE * noise(input)).max(SAME * (high - low));
     let levels = levels(input, tolerance);
-    let mut jumps = Vec::new();
+    let mut moves = Moves::default();
     for pair in levels.windows(2) {
         let [from, to] = pair else { continue };
         let size = (to.value - from.value).abs();
         let taken = to.rows.start - from.rows.end;
         let flat = |level: &Level| drift(&input[level.rows.clone()]) <= FLAT * size;
         let quick = taken as f64 <= QUICK * from.rows.len().min(to.rows.len()) as f64;
-        if size > tolerance && quick && flat(from) && flat(to) {
+        if size > tolerance && flat(from) && flat(to) {
             let to = Level { rows: from.rows.end..to.rows.end, value: to.value };
-            jumps.push(Jump { from: from.clone(), to, taken });
+            let jump = Jump { from: from.clone(), to, taken };
+            if quick { moves.steps.push(jump) } else { moves.slow.push(jump) }
         }
     }
-    jumps
+    moves
 }
 
 /// Runs of values near their mean.

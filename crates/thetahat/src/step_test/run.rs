@@ -2,7 +2,7 @@
 
 use super::document::{FittedProcess, Shape, Step, StepFigure, StepMethod, StepSummary, StepTest};
 use super::evaluate::{Section, evaluated};
-use super::levels::jumps;
+use super::levels::{Jump, moves};
 use super::process::fitted;
 use crate::data::{Log, Rows, Source, checked};
 use crate::figures::{error, short};
@@ -16,6 +16,9 @@ const AS_NOISE: f64 = 1.3;
 const DIFFER: f64 = 4.0;
 /// And by this fraction.
 const APART: f64 = 0.02;
+
+/// So many changes that are too slow for steps are told one by one.
+const TOLD: usize = 3;
 
 /// What to evaluate.
 #[derive(Debug, Clone, PartialEq)]
@@ -86,7 +89,13 @@ pub fn step_test(log: &Log, sources: &[Source], plan: &StepTestPlan) -> Result<S
     let mut steps = Vec::new();
     let mut warnings = Vec::new();
     for section in &sections {
-        for jump in jumps(&section.input) {
+        let found = moves(&section.input);
+        warnings.extend(found.slow.iter().take(TOLD).map(|jump| too_slow(section, jump, plan)));
+        if found.slow.len() > TOLD {
+            warnings
+                .push(format!("and {} more changes that are too slow for steps", found.slow.len() - TOLD));
+        }
+        for jump in found.steps {
             let number = steps.len() + 1;
             let (step, words) = evaluated(section, &jump)?;
             warnings.extend(words.into_iter().map(|word| format!("step {number}: {word}")));
@@ -198,6 +207,21 @@ fn nothing(sections: &[Section], plan: &StepTestPlan) -> String {
     format!(
         "there is no step: the input '{name}' does not jump from one level that it holds to another; spectrum and fit take other \
          signals, and step takes the document of spectrum by sines"
+    )
+}
+
+/// Why a change of the input is no step.
+fn too_slow(section: &Section, jump: &Jump, plan: &StepTestPlan) -> String {
+    let Jump { from, to, taken } = jump;
+    // The level after it begins where it does.
+    let held = from.rows.len().min(to.rows.len() - taken);
+    format!(
+        "from row {} on '{}' goes from {} to {} in {taken} rows, which is slow beside a level of {held} rows: it is left out, and a process takes \
+         it as it is (`structure` p1d of a fit)",
+        section.rows[to.rows.start] + 1,
+        plan.input,
+        short(from.value),
+        short(to.value)
     )
 }
 

@@ -40,11 +40,14 @@ fn an_input_that_follows_the_output_gets_models_with_noise() {
     let inspection: Value = serde_json::from_str(&folder.done("inspect log.csv --format json").stdout)
         .expect("the document is JSON");
     assert_eq!(inspection["delays"][0]["nk"], report["selection"]["delays"][0]["nk"]);
-    // Who names a structure or a purpose has it.
+    // Who names a structure or a purpose has it, and who names a delay.
     for options in ["--model oe", "--focus simulation"] {
         let report = folder.fit(&format!("log.csv {options}"));
-        assert_eq!(kinds(&report), [""; 0], "{options}");
+        assert_eq!(report["decisions"][0]["did"], "it acts one sample later at the earliest", "{options}");
+        assert_eq!(kinds(&folder.fit(&format!("log.csv {options} --nk 0"))), [""; 0], "{options}");
     }
+    let report = folder.fit("log.csv --nk 0");
+    assert_eq!((kinds(&report), &report["model"]["orders"]["nk"]), (vec!["feedback"], &json!([0])));
 }
 
 #[test]

@@ -65,8 +65,11 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     let structures = structures(task, automatic, closed)?;
     let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));
     let mut steps = Vec::new();
-    let decided = closed || automatic.nk.is_none() && follows.contains(&true);
-    let decisions = if decided { vec![in_closed_loop(task, &follows, closed)] } else { Vec::new() };
+    let searches = automatic.nk.is_none() && follows.contains(&true);
+    let decisions = match searches || closed {
+        true => vec![in_closed_loop(task, &follows, searches, closed)],
+        false => Vec::new(),
+    };
     let (delays, nk) = match &automatic.nk {
         Some(nk) if nk.len() == inputs => (Vec::new(), nk.clone()),
         Some(nk) => {
@@ -112,8 +115,8 @@ fn loops(task: &Task<'_>) -> Loop {
     feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments)
 }
 
-/// What feedback means for the choice.
-fn in_closed_loop(task: &Task<'_>, follows: &[bool], is_open: bool) -> Decision {
+/// What feedback means for the choice: whether delays are searched, and whether structures and what decides are open.
+fn in_closed_loop(task: &Task<'_>, follows: &[bool], delays: bool, structures: bool) -> Decision {
     let names =
         task.inputs.iter().zip(follows).filter(|(_, follows)| **follows).map(|(name, _)| name.clone());
     let channels: Vec<String> = names.collect();
@@ -121,20 +124,22 @@ fn in_closed_loop(task: &Task<'_>, follows: &[bool], is_open: bool) -> Decision 
         1 => ("input", "follows", "it acts"),
         _ => ("inputs", "follow", "they act"),
     };
+    let later = format!("{they} one sample later at the earliest");
+    let noise =
+        "models with noise of their own compete (ARX, ARMAX, Box-Jenkins), and errors one step ahead decide";
+    let (did, instead) = match (delays, structures) {
+        (true, true) => (format!("{later}, {noise}"), "`nk`, `model` or `focus`"),
+        (true, false) => (later, "`nk`"),
+        (false, _) => (noise.to_owned(), "`model` or `focus`"),
+    };
     Decision {
         kind: FindingKind::Feedback,
         because: format!(
             "{input} '{}' {follow} past errors of the output, as in a closed loop",
             channels.join("', '")
         ),
-        did: match is_open {
-            true => format!(
-                "{they} one sample later at the earliest, models with noise of their own compete (ARX, ARMAX, Box-Jenkins), and errors one \
-                 step ahead decide"
-            ),
-            false => format!("{they} one sample later at the earliest"),
-        },
-        instead: if is_open { "`model` or `focus`" } else { "`nk`" }.to_owned(),
+        did,
+        instead: instead.to_owned(),
         channels,
     }
 }

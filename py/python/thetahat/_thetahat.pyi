@@ -76,6 +76,7 @@ __all__ = [
     "spectrum",
     "step_test",
     "threads",
+    "topics",
     "tune",
     "validate",
     "write",

@@ -1,17 +1,15 @@
 use std::collections::HashSet;
-use std::fmt;
 use std::ops::Range;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::padding::Padding;
 use crate::Error;
 use crate::data::{Offset, Regular, Rows, checked, shortest};
 use crate::figures::short;
 
-/// This many rows at the end that repeat one value in all channels are told.
-const PADDING: usize = 20;
 /// A step longer than this many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
 /// Where this part of the steps is longer, they are none: the log is one of two rates. Then a gap is longer than 1.5 of the step that
@@ -76,42 +74,6 @@ pub enum Interpolation {
     /// Each channel its own: one that moves in steps holds its last value, a smooth one is read from straight lines. Not through a gap of
     /// the clock.
     Auto,
-}
-
-/// Rows at the end of which all channels repeat one value.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Padding {
-    pub(crate) rows: Rows,
-}
-
-impl Padding {
-    /// Whether the last of some rows, in which all channels repeat one value, are that.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] if there are more of them than rows.
-    pub(crate) fn of(rows: usize, last: usize) -> Result<Option<Self>, Error> {
-        if last < PADDING.max(rows / 100) || last == rows {
-            return Ok(None);
-        }
-        Ok(Some(Self { rows: Rows::new((rows + 1).saturating_sub(last), rows)? }))
-    }
-
-    /// What is seen of it.
-    pub(crate) fn seen(&self) -> String {
-        let (first, rows) = (self.rows.first(), self.rows.len());
-        format!("from row {first} to the end ({rows} rows) no channel changes, as in a log that was padded")
-    }
-
-    /// What to do about it.
-    pub(crate) fn advice(&self) -> String {
-        format!("leave these rows out (`estimate` 1..{}) unless the plant rested", self.rows.first() - 1)
-    }
-}
-
-impl fmt::Display for Padding {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.seen(), self.advice())
-    }
 }
 
 impl Log {
@@ -441,7 +403,7 @@ impl Log {
         self.channels.iter().any(|channel| channel.name == name)
     }
 
-    /// The last rows of which all named channels repeat one value, as padding does: at least [`PADDING`] and a hundredth of all.
+    /// The last rows of which all named channels repeat one value, as padding does: at least 20 and a hundredth of all.
     ///
     /// # Errors
     /// [`Error::Data`] for a name that is not there.

@@ -10,6 +10,7 @@ pub use response::fit_process_to_response;
 use thetahat_numerics::optimize::{Monitor, Search};
 
 use super::evaluate::evaluate;
+use super::plan::Plan;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Decision, FindingKind, Log, Offset, Rows, Source, Split};
@@ -47,6 +48,22 @@ pub struct ProcessPlan {
 }
 
 impl ProcessPlan {
+    /// The process of the channels and rows of another plan, whose structures are to be named.
+    pub(super) fn of(plan: &Plan, search: &Search) -> Self {
+        Self {
+            inputs: plan.inputs.clone(),
+            output: plan.output.clone(),
+            structures: Vec::new(),
+            estimate: plan.estimate.clone(),
+            validate: plan.validate.clone(),
+            split: plan.split,
+            offsets: Vec::new(),
+            trend: plan.trend,
+            free_start: (plan.initial == Initial::Zero).then_some(false),
+            search: search.clone(),
+        }
+    }
+
     /// A plan for one structure from all inputs, with the other choices at their defaults.
     pub fn new(inputs: &[&str], output: &str, structure: ProcessStructure) -> Self {
         Self {

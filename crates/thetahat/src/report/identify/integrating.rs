@@ -34,18 +34,7 @@ impl<'l> Integrating<'l> {
     /// None where the plan asks for something that a process is not.
     pub(super) fn of(log: &'l Log, plan: &Plan) -> Option<Self> {
         let open = plan.leaves_all_open() && plan.inputs.len() == 1 && plan.offsets.is_empty();
-        let own = ProcessPlan {
-            inputs: plan.inputs.clone(),
-            output: plan.output.clone(),
-            structures: Vec::new(),
-            estimate: plan.estimate.clone(),
-            validate: plan.validate.clone(),
-            split: plan.split,
-            offsets: Vec::new(),
-            trend: false,
-            free_start: None,
-            search: plan.search()?.clone(),
-        };
+        let own = ProcessPlan::of(plan, plan.search()?);
         open.then_some(Self { log, plan: own })
     }
 

@@ -44,18 +44,7 @@ impl<'l> StepTest<'l> {
         });
         let names: Vec<&str> = plan.inputs.iter().map(String::as_str).collect();
         let held = held_logs(&log.deviations(offsets)?, &names, rows)?;
-        let plan = ProcessPlan {
-            inputs: plan.inputs.clone(),
-            output: plan.output.clone(),
-            structures: Vec::new(),
-            estimate: plan.estimate.clone(),
-            validate: plan.validate.clone(),
-            split: plan.split,
-            offsets: Vec::new(),
-            trend: plan.trend,
-            free_start: if plan.initial == Initial::Zero { Some(false) } else { None },
-            search: search.clone(),
-        };
+        let plan = ProcessPlan::of(plan, search);
         Ok(Some(Self { log, held, plan }))
     }
 

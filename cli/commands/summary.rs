@@ -24,7 +24,7 @@ use thetahat::estimate::{
     ConvexOutcome, Criteria, InformationCriterion, Initial, Norm, Procedure, RobustOutcome, SearchOutcome,
     Solver,
 };
-use thetahat::figures::{error, fixed, number, scientific, short};
+use thetahat::figures::{error, fixed, number, of_unit, scientific, seconds, short};
 use thetahat::model::{Interval, Model, Orders, PolynomialModel, Quantity, Root, Signal, Structure};
 use thetahat::optimize::{Algorithm, Stopped};
 use thetahat::report::{Estimation, Report};
@@ -76,7 +76,7 @@ pub fn table(report: &Report, width: usize) -> String {
     };
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
-    text.line(&format!("{}, sample time {} s", formula(&model.orders), short(model.sample_time)));
+    text.line(&format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
     text.line(&signals.join(", "));
@@ -347,7 +347,7 @@ fn dynamics(text: &mut Text, model: &PolynomialModel) {
             text::complex(root),
             text::spread(root),
         ];
-        let value = time.map(|time| or_dash(time, |time| number(time.value)));
+        let value = time.map(|time| or_dash(time, |time| of_unit(time.value, "s")));
         let interval = time.map(|time| or_dash(time.and_then(|time| time.interval), interval));
         roots.row(row.into_iter().chain([value, interval].map(Option::unwrap_or_default)));
         count += 1;

@@ -1,6 +1,6 @@
 //! A model in continuous time, as a table for people.
 
-use thetahat::figures::{number, short, three};
+use thetahat::figures::{number, of_unit, seconds, short, three};
 use thetahat::model::{ContinuousStateSpaceModel, ZerosPolesGain};
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -20,11 +20,11 @@ const NO_ERROR: &str = "no time constant goes with a pole that does not decay, a
 /// The main figures of a model in continuous time.
 pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: usize) -> String {
     let mut text = Text::new(width);
-    let (name, seconds) = (report.model.name(), short(model.sample_time));
-    text.line(&format!("{name}, from a sample time of {seconds} s with {}", model.hold));
+    let (name, step) = (report.model.name(), seconds(model.sample_time));
+    text.line(&format!("{name}, from a sample time of {step} with {}", model.hold));
     text.line("dx/dt = A x + B u + K e, y = C x + D u + e");
     let inputs = model.inputs.iter().zip(&model.delays).map(|(input, delay)| {
-        let waits = if *delay > 0.0 { format!(", delay {} s", short(*delay)) } else { String::new() };
+        let waits = if *delay > 0.0 { format!(", delay {}", seconds(*delay)) } else { String::new() };
         format!("{}{waits}", signal("input", input))
     });
     let outputs = model.outputs.iter().map(|output| signal("output", output));
@@ -55,8 +55,12 @@ fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
         let value = text::complex(pole);
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
         let spread = known.then(|| text::spread(pole));
-        let figures =
-            [value, number(*frequency), or_dash(*damping, three), or_dash(*time, |time| number(time.value))];
+        let figures = [
+            value,
+            number(*frequency),
+            or_dash(*damping, three),
+            or_dash(*time, |time| of_unit(time.value, "s")),
+        ];
         table.row(figures.into_iter().chain(spread));
     }
     if !model.poles.is_empty() {

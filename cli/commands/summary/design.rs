@@ -1,7 +1,7 @@
 //! Test signals, and what they are worth, for people.
 
 use thetahat::design::{ExperimentDesign, SignalFigures, SignalPlan, SignalWorth, TestSignal};
-use thetahat::figures::{error, fixed, number, short, three};
+use thetahat::figures::{error, fixed, number, seconds, short, three};
 
 use super::ROUNDING;
 use super::text::{Text, columns, or_dash};
@@ -51,9 +51,9 @@ pub(crate) fn test_signal(
 pub fn experiment_design(found: &ExperimentDesign, width: usize) -> String {
     let mut text = Text::new(width);
     text.line(&format!(
-        "{}, sample time {} s: standard errors after {} samples",
+        "{}, sample time {}: standard errors after {} samples",
         found.model,
-        short(found.sample_time),
+        seconds(found.sample_time),
         found.length
     ));
     text.line("");

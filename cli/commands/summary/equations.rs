@@ -1,7 +1,7 @@
 //! What a fit of a model in equations found, as a table for people.
 
 use thetahat::estimate::Procedure;
-use thetahat::figures::{error, number, scientific, short};
+use thetahat::figures::{error, number, scientific, seconds, short};
 use thetahat::model::EquationsModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -17,7 +17,7 @@ pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> St
     let names = |signals: &[thetahat::model::Signal]| {
         listed(signals.iter().map(|signal| harmless(&signal.name)).collect())
     };
-    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(&format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
     text.line(&format!(
         "inputs {}, outputs {}, states {}",
         names(&model.inputs),

@@ -1,6 +1,6 @@
 //! An inspection as a table for people.
 
-use thetahat::figures::{chance, fixed, number, short};
+use thetahat::figures::{chance, fixed, number, seconds, short};
 use thetahat::inspect::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 use thetahat::text::{brief, harmless};
 
@@ -42,20 +42,20 @@ fn more(text: &mut Text, all: usize, shown: usize, what: &str) {
 
 fn clock(inspection: &Inspection) -> String {
     let clock = &inspection.clock;
-    let (file, step) = (harmless(&inspection.log.file), short(clock.sample_time));
+    let (file, step) = (harmless(&inspection.log.file), seconds(clock.sample_time));
     let rows = match inspection.experiments {
         1 => format!("{} rows", inspection.rows),
         experiments => format!("{} rows in {experiments} experiments", inspection.rows),
     };
     if !clock.measured {
-        return format!("{file}: {rows}, sample time {step} s");
+        return format!("{file}: {rows}, sample time {step}");
     }
     let (shortest, longest) = clock.steps;
     format!(
-        "{file}: {rows}, {} clock: steps from {} s to {} s, median {step} s, jitter {} %, {} gap{}",
+        "{file}: {rows}, {} clock: steps from {} to {}, median {step}, jitter {} %, {} gap{}",
         if clock.irregular { "irregular" } else { "regular" },
-        short(shortest),
-        short(longest),
+        seconds(shortest),
+        seconds(longest),
         fixed(100.0 * clock.jitter, 2),
         clock.gaps,
         if clock.gaps == 1 { "" } else { "s" }

@@ -1,7 +1,7 @@
 //! What a fit of a nonlinear ARX model found, as a table for people.
 
 use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
-use thetahat::figures::{error, number, scientific, short};
+use thetahat::figures::{error, number, scientific, seconds, short};
 use thetahat::model::{NonlinearArxModel, Parameter};
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -15,7 +15,7 @@ const NO_RUN: &str = "functions that are always there are still to come, or the 
 /// The main figures of a fit of a nonlinear ARX model.
 pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) -> String {
     let mut text = Text::new(width);
-    text.line(&format!("{}, sample time {} s", harmless(&report.model.name()), short(model.sample_time)));
+    text.line(&format!("{}, sample time {}", harmless(&report.model.name()), seconds(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let outputs = model.outputs.iter().map(|output| signal("output", output));
     let signals: Vec<String> = signals.chain(outputs).collect();

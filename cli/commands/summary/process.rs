@@ -1,7 +1,7 @@
 //! What a fit of a process found, as a table for people.
 
 use thetahat::estimate::Procedure;
-use thetahat::figures::{error, number, short};
+use thetahat::figures::{error, number, of_unit, seconds};
 use thetahat::model::ProcessModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -14,7 +14,7 @@ use super::{NO_ERROR, counted, fits, samples, signal, stopped};
 pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> String {
     let mut text = Text::new(width);
     selection(&mut text, report);
-    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(&format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
     let formulas: Vec<String> = model.structures.iter().map(|structure| structure.equation()).collect();
     for (formula, input) in formulas.iter().zip(&model.inputs) {
         text.line(&format!("G = {formula} from {}", harmless(&input.name)));
@@ -37,7 +37,7 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
     for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
         parameters.row([
             parameter.name.clone(),
-            number(parameter.value),
+            of_unit(parameter.value, unit),
             unit.to_owned(),
             or_dash(parameter.standard_error, error),
             or_dash(*white, error),

@@ -1,7 +1,7 @@
 //! A measured response as a table for people.
 
 use thetahat::data::Rows;
-use thetahat::figures::{error, fixed, number, short, three};
+use thetahat::figures::{error, fixed, number, seconds, three};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::text::{brief, harmless};
 
@@ -17,10 +17,10 @@ pub fn response(found: &MeasuredResponse, width: usize) -> String {
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     let rows: usize = found.rows.iter().map(Rows::len).sum();
     text.line(&format!(
-        "{}: {rows} rows ({}), sample time {} s",
+        "{}: {rows} rows ({}), sample time {}",
         some(&files, SEGMENTS, ", "),
         some(&found.rows, SEGMENTS, ", "),
-        short(found.sample_time)
+        seconds(found.sample_time)
     ));
     let title = found.method.title();
     let mut first = title.chars();

@@ -1,7 +1,7 @@
 //! What a fit of a state-space model found, as a table for people.
 
 use thetahat::estimate::{Coupling, Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
-use thetahat::figures::{fixed, number, short, three};
+use thetahat::figures::{fixed, number, of_unit, seconds, three};
 use thetahat::model::{Quantity, Signal, StateSpaceModel};
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -71,7 +71,7 @@ pub(super) fn model_alone(report: &Report, model: &StateSpaceModel, width: usize
 
 /// What it is, and of what.
 fn head(text: &mut Text, report: &Report, model: &StateSpaceModel, equation: &str) {
-    text.line(&format!("{}, sample time {} s", report.model.name(), short(model.sample_time)));
+    text.line(&format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
     text.line(equation);
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let outputs = model.outputs.iter().map(|output| signal("output", output));
@@ -173,7 +173,7 @@ fn poles(text: &mut Text, model: &StateSpaceModel) {
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
         let spread = known.then(|| text::spread(pole));
         let interval = known.then(|| or_dash(time.and_then(|time| time.interval), interval));
-        let figures = [three(pole.re.hypot(pole.im)), or_dash(*time, |time| number(time.value))];
+        let figures = [three(pole.re.hypot(pole.im)), or_dash(*time, |time| of_unit(time.value, "s"))];
         table.row(std::iter::once(value).chain(spread).chain(figures).chain(interval));
     }
     if !model.poles.is_empty() {

@@ -1,6 +1,6 @@
 //! A step test as a table for people.
 
-use thetahat::figures::{error, fixed, number, short};
+use thetahat::figures::{error, fixed, number, of_unit, short};
 use thetahat::model::Quantity;
 use thetahat::step_test::{FittedProcess, Step, StepTest};
 use thetahat::text::{brief, harmless};
@@ -70,7 +70,8 @@ fn process_line(text: &mut Text, process: &FittedProcess) {
     let each = process.parameters.iter().map(|parameter| {
         let error =
             parameter.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));
-        format!("{} {}{error}", parameter.name, number(parameter.value))
+        let value = of_unit(parameter.value, process.structure.unit(&parameter.name));
+        format!("{} {value}{error}", parameter.name)
     });
     text.line(&format!(
         "process {} of least squares, {}: {}, RMSE {}",
@@ -104,7 +105,7 @@ fn figures(text: &mut Text, found: &StepTest) {
         let mut cells = vec![
             if name == last { String::new() } else { name.clone() },
             format!("{}{trust}", of.method.title(of.figure)),
-            number(value),
+            of_unit(value, unit),
             or_dash(standard_error, error),
         ];
         if several {

@@ -1,6 +1,6 @@
 //! Settings of controllers as a table for people.
 
-use thetahat::figures::{fixed, number, short};
+use thetahat::figures::{fixed, number, seconds, short};
 use thetahat::text::harmless;
 use thetahat::tune::{ReducedProcess, Tuning};
 
@@ -67,11 +67,11 @@ pub fn tuning(found: &Tuning, width: usize) -> String {
 fn process(seen: &ReducedProcess) -> String {
     let mut words = format!("K {}", short(seen.gain));
     match seen.time_constant {
-        Some(tau) => words += &format!(", tau1 {}", short(tau)),
+        Some(tau) => words += &format!(", tau1 {}", seconds(tau)),
         None => words += ", integrating",
     }
     if seen.second_time_constant > 0.0 {
-        words += &format!(", tau2 {}", short(seen.second_time_constant));
+        words += &format!(", tau2 {}", seconds(seen.second_time_constant));
     }
-    words + &format!(", theta {}", short(seen.dead_time))
+    words + &format!(", theta {}", seconds(seen.dead_time))
 }

@@ -113,6 +113,65 @@ pub fn chance(probability: f64) -> String {
     }
 }
 
+/// A time as people say it where they do not count seconds: below a thousandth of one, and from a minute and a half on.
+///
+/// ```
+/// use thetahat_numerics::figures::spoken_time;
+///
+/// assert_eq!(spoken_time(5421.0).as_deref(), Some("1.51 h"));
+/// assert_eq!(spoken_time(0.00025).as_deref(), Some("0.25 ms"));
+/// assert_eq!(spoken_time(30.0), None);
+/// ```
+pub fn spoken_time(seconds: f64) -> Option<String> {
+    let size = seconds.abs();
+    if size == 0.0 || !size.is_finite() {
+        return None;
+    }
+    // Each unit with where it begins.
+    const UNITS: [(f64, f64, &str); 6] = [
+        (1.728e5, 8.64e4, "d"),
+        (5400.0, 3600.0, "h"),
+        (90.0, 60.0, "min"),
+        (1e-3, 1.0, ""),
+        (1e-4, 1e-3, "ms"),
+        (1e-7, 1e-6, "µs"),
+    ];
+    let (_, unit, name) = *UNITS.iter().find(|(begins, ..)| size >= *begins).unwrap_or(&(0.0, 1e-9, "ns"));
+    let value = three(seconds / unit);
+    let value = if value.contains('.') && !value.contains('e') {
+        value.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &value
+    };
+    (!name.is_empty()).then(|| format!("{value} {name}"))
+}
+
+/// A figure in a column that has its unit beside it, to six digits; of seconds with [`spoken_time`] too.
+///
+/// ```
+/// use thetahat_numerics::figures::of_unit;
+///
+/// assert_eq!([of_unit(5400.0, "s"), of_unit(5400.0, "rad/s")], ["5400.00 (1.5 h)", "5400.00"]);
+/// ```
+pub fn of_unit(value: f64, unit: &str) -> String {
+    if unit == "s" { with_spoken(number(value), value) } else { number(value) }
+}
+
+/// A time in a sentence.
+///
+/// ```
+/// use thetahat_numerics::figures::seconds;
+///
+/// assert_eq!([seconds(90.0), seconds(2.5)], ["90 s (1.5 min)", "2.5 s"]);
+/// ```
+pub fn seconds(seconds: f64) -> String {
+    with_spoken(format!("{} s", short(seconds)), seconds)
+}
+
+fn with_spoken(written: String, seconds: f64) -> String {
+    spoken_time(seconds).map_or_else(|| written.clone(), |spoken| format!("{written} ({spoken})"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

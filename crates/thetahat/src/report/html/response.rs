@@ -3,7 +3,7 @@
 use super::page::{Page, Section, Table};
 use super::{charts, of, tables};
 use crate::data::Rows;
-use crate::figures::{fixed, short};
+use crate::figures::{fixed, seconds};
 use crate::model::LinearModel;
 use crate::spectrum::{Agreement, MeasuredResponse};
 
@@ -18,12 +18,12 @@ pub fn response_page(
     let mut page = Page::new(title, command, &found.generator);
     let rows: usize = found.rows.iter().map(Rows::len).sum();
     page.lead = vec![format!(
-        "By {}, from {rows} rows of {} s, at {} frequencies.",
+        "By {}, from {rows} rows of {}, at {} frequencies.",
         match found.method.title() {
             title if title.starts_with("local") => format!("the {title}"),
             title => title,
         },
-        short(found.sample_time),
+        seconds(found.sample_time),
         found.noise.len()
     )];
     page.lead.push(match found.bands.honest {

@@ -6,7 +6,7 @@ use super::page::{Page, Section, Table};
 use super::text::{or_dash, quantity};
 use super::{of, tables};
 use crate::data::Log;
-use crate::figures::{number, short, three};
+use crate::figures::{of_unit, short, three};
 use crate::model::LinearModel;
 use crate::step_test::{FittedProcess, StepSummary, StepTest};
 
@@ -86,7 +86,7 @@ fn parameters(process: &FittedProcess) -> Table {
     for parameter in &process.parameters {
         table.row([
             parameter.name.clone(),
-            number(parameter.value),
+            of_unit(parameter.value, process.structure.unit(&parameter.name)),
             process.structure.unit(&parameter.name).to_owned(),
             or_dash(parameter.standard_error, three),
         ]);
@@ -149,7 +149,7 @@ fn summaries(found: &StepTest) -> Table {
         let mut cells = vec![
             format!("{}{unit}", figure.name()),
             method.title(figure).to_owned(),
-            number(value.value),
+            of_unit(value.value, figure.unit()),
             or_dash(value.standard_error, three),
             trust,
         ];

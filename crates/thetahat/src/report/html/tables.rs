@@ -9,12 +9,12 @@ use validation::asked;
 pub(super) use validation::{anderson, coverage, noise, tests, which};
 
 use super::page::Table;
-use super::text::{complex, or_dash, quantity, rows};
+use super::text::{complex, or_dash, quantity, rows, time_constant};
 use crate::data::{Rows, Source};
 use crate::estimate::{
     Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome, VectorArxOutcome,
 };
-use crate::figures::{chance, fixed, number, scientific, short, three};
+use crate::figures::{chance, fixed, number, of_unit, scientific, seconds, short, three};
 use crate::model::{
     ContinuousStateSpaceModel, EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel,
     ProcessModel, Quantity, Root, Signal, StateSpaceModel,
@@ -127,7 +127,7 @@ pub(super) fn roots(model: &PolynomialModel) -> Table {
     };
     let times = model.time_constants.iter().copied().chain(std::iter::repeat(None));
     for (pole, time) in model.poles.iter().zip(times) {
-        add("pole", pole, Some(or_dash(time, quantity)));
+        add("pole", pole, Some(or_dash(time, time_constant)));
     }
     model.zeros.iter().flatten().for_each(|zero| add("zero", zero, None));
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
@@ -167,7 +167,7 @@ pub(super) fn eigenvalues(model: &StateSpaceModel) -> Table {
         table.row([role.to_owned(), complex(pole), spread(pole), modulus, time]);
     };
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
-        add("pole", pole, or_dash(*time, quantity));
+        add("pole", pole, or_dash(*time, time_constant));
     }
     model.predictor_poles.iter().for_each(|pole| add("pole of the predictor", pole, String::new()));
     table
@@ -180,7 +180,7 @@ pub(super) fn continuous_poles(model: &ContinuousStateSpaceModel) -> Table {
     let figures = model.natural_frequencies.iter().zip(&model.damping).zip(&model.time_constants);
     for (pole, ((frequency, damping), time)) in model.poles.iter().zip(figures) {
         let damping = or_dash(*damping, number);
-        table.row([complex(pole), number(*frequency), damping, or_dash(*time, quantity)]);
+        table.row([complex(pole), number(*frequency), damping, or_dash(*time, time_constant)]);
     }
     table
 }
@@ -245,7 +245,7 @@ pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table
     for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
         table.row([
             parameter.name.clone(),
-            number(parameter.value),
+            of_unit(parameter.value, unit),
             unit.to_owned(),
             or_dash(parameter.standard_error, three),
             or_dash(*white, three),
@@ -493,7 +493,7 @@ pub(super) fn data(report: &Report) -> Table {
     let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
     let parts = |parts: &[Rows]| if parts.is_empty() { "none".to_owned() } else { rows(parts) };
     add("rows", data.rows.to_string());
-    add("sample time", format!("{} s", short(data.sample_time)));
+    add("sample time", seconds(data.sample_time));
     add("detrend", data.detrend.clone());
     if let Some(band) = data.prefilter {
         add("fitted in the band", format!("{band} Hz"));

@@ -1,8 +1,8 @@
 //! How numbers and names are written.
 
 use crate::data::Rows;
-use crate::figures::{number, three};
-use crate::model::{Quantity, Root};
+use crate::figures::{number, spoken_time, three};
+use crate::model::{Interval, Quantity, Root};
 use crate::text::harmless;
 
 /// What stands where there is no figure.
@@ -24,10 +24,19 @@ pub(super) fn or_dash<T>(value: Option<T>, shown: impl FnOnce(T) -> String) -> S
 /// A figure and its interval, or its standard error where there is none.
 pub(super) fn quantity(quantity: Quantity) -> String {
     if let Some(interval) = quantity.interval {
+        if interval == Interval::OPEN {
+            return "not determined by this log".to_owned();
+        }
         return format!("{}, 95 %: {}", number(quantity.value), interval.shown(number));
     }
     let error = quantity.standard_error.map_or_else(String::new, |error| format!(" ± {}", three(error)));
     format!("{}{error}", number(quantity.value))
+}
+
+/// A time constant in seconds: as [`quantity`], and as people say such a time.
+pub(super) fn time_constant(time: Quantity) -> String {
+    let spoken = spoken_time(time.value).map_or_else(String::new, |spoken| format!(" ({spoken})"));
+    format!("{}{spoken}", quantity(time))
 }
 
 pub(super) fn complex(root: &Root) -> String {

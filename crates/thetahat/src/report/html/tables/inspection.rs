@@ -1,7 +1,7 @@
 //! What an inspection says.
 
 use super::yes;
-use crate::figures::{chance, number, short, three};
+use crate::figures::{chance, number, seconds, short, three};
 use crate::inspect::Inspection;
 use crate::report::html::page::Table;
 use crate::report::html::text::{or_dash, percent};
@@ -15,8 +15,8 @@ pub(in crate::report::html) fn clock(inspection: &Inspection) -> Table {
     let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
     add("rows", inspection.rows.to_string());
     let source = if clock.measured { "" } else { " (the log has no times)" };
-    add("median step", format!("{} s{source}", short(clock.sample_time)));
-    add("shortest and longest step", format!("{} s, {} s", short(clock.steps.0), short(clock.steps.1)));
+    add("median step", format!("{}{source}", seconds(clock.sample_time)));
+    add("shortest and longest step", format!("{}, {}", seconds(clock.steps.0), seconds(clock.steps.1)));
     add("jitter", percent(clock.jitter));
     add("gaps", clock.gaps.to_string());
     add("has to be resampled", yes(clock.irregular));

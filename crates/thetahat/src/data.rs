@@ -23,6 +23,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+mod differenced;
 mod digest;
 mod finding;
 mod joint_record;
@@ -41,6 +42,7 @@ mod split;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use differenced::Differenced;
 pub(crate) use digest::{digest, digests, inside, text_digest};
 pub use finding::{Decision, Finding, FindingKind};
 pub use joint_record::JointRecord;

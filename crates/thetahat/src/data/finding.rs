@@ -79,6 +79,8 @@ pub enum FindingKind {
     InMotion,
     /// An output that follows the sum of an input.
     Integration,
+    /// An output whose level wanders, and no input makes it.
+    Drift,
     /// An output that answers nonlinearly.
     Nonlinear,
     /// No channel is the output.

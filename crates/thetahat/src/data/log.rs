@@ -642,24 +642,39 @@ pub(crate) fn gap_of(limit: f64, long: f64, steps: f64, most: impl FnOnce() -> f
     if long >= LONG_STEPS && long >= TWO_RATES * steps { GAP * most() } else { limit }
 }
 
+/// Whether each time is finite and later than the one before. In blocks, so that the comparisons are made several at a time.
+pub(super) fn runs_forward(time: &[f64]) -> bool {
+    const BLOCK: usize = 1024;
+    let ends = [time.first(), time.last()];
+    ends.iter().flatten().all(|time| time.is_finite())
+        && time.len().checked_sub(1).is_none_or(|steps| {
+            (0..steps).step_by(BLOCK).all(|start| {
+                let pairs = &time[start..(start + BLOCK).min(steps) + 1];
+                pairs[1..].iter().zip(pairs).fold(true, |all, (after, before)| all & (after > before))
+            })
+        })
+}
+
 /// The median time step of a clock that runs forward.
 pub(super) fn median_step(time: &[f64], rows: usize) -> Result<f64, Error> {
     let at = |row: usize, message: String| Error::Data { channel: None, row: Some(row), message };
     if time.len() != rows {
         return Err(Error::data(format!("there are {} time stamps for {rows} rows", time.len())));
     }
-    if let Some(row) = time.iter().position(|time| !time.is_finite()) {
-        return Err(at(row + 1, "the time is not a finite number".to_owned()));
-    }
-    if let Some(position) = steps(time).position(|step| step <= 0.0) {
-        let (before, after) = (time[position], time[position + 1]);
-        let verb = if after == before { "repeats" } else { "goes back" };
-        return Err(at(
-            position + 2,
-            format!(
-                "time {verb} (from {before} s to {after} s); sort the log by time and remove repeated rows"
-            ),
-        ));
+    if !runs_forward(time) {
+        if let Some(row) = time.iter().position(|time| !time.is_finite()) {
+            return Err(at(row + 1, "the time is not a finite number".to_owned()));
+        }
+        if let Some(position) = steps(time).position(|step| step <= 0.0) {
+            let (before, after) = (time[position], time[position + 1]);
+            let verb = if after == before { "repeats" } else { "goes back" };
+            return Err(at(
+                position + 2,
+                format!(
+                    "time {verb} (from {before} s to {after} s); sort the log by time and remove repeated rows"
+                ),
+            ));
+        }
     }
     let mut steps: Vec<f64> = steps(time).collect();
     let middle = steps.len() / 2;

@@ -10,6 +10,7 @@
 //!
 //! Everything else is an error that says what was seen.
 
+use super::log::runs_forward;
 use crate::Error;
 use crate::figures::short;
 
@@ -69,7 +70,8 @@ pub enum Calendar {
 /// ```
 pub fn mended(time: Vec<f64>, calendar: Calendar) -> Result<Mended, Error> {
     let mut clock = Mended { time, restarts: Vec::new(), words: Vec::new() };
-    if clock.time.iter().any(|time| !time.is_finite()) {
+    let forward = runs_forward(&clock.time);
+    if !forward && clock.time.iter().any(|time| !time.is_finite()) {
         // Who makes a log of it says so.
         return Ok(clock);
     }
@@ -77,7 +79,7 @@ pub fn mended(time: Vec<f64>, calendar: Calendar) -> Result<Mended, Error> {
         Calendar::Wall { first } => changes_forward(&clock.time, first),
         _ => Vec::new(),
     };
-    if changes.is_empty() && clock.time.windows(2).all(|pair| pair[1] > pair[0]) {
+    if changes.is_empty() && forward {
         return Ok(clock);
     }
     clock.spread_bursts();

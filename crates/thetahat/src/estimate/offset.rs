@@ -119,6 +119,13 @@ pub(crate) struct OutputOffset {
     pub(crate) middle: f64,
 }
 
+impl Fitted {
+    /// An estimate beside which no offset was looked for.
+    pub(crate) fn without_offset(estimate: Estimate) -> Self {
+        Self { criteria: estimate.criteria(), estimate, offset: None, open: None }
+    }
+}
+
 impl<D> Clone for Task<'_, D> {
     fn clone(&self) -> Self {
         *self
@@ -250,7 +257,7 @@ impl<D: ExperimentData> Task<'_, D> {
         let method = starting_from(self.method, start);
         let Self { data, inputs, orders, initial, monitor, .. } = *self;
         let estimate = estimate_of_channels(data, inputs, orders, &method, initial, monitor)?;
-        Ok(Fitted { criteria: estimate.criteria(), estimate, offset: None, open: None })
+        Ok(Fitted::without_offset(estimate))
     }
 
     /// With a constant, whatever it is worth.

@@ -114,6 +114,17 @@ pub struct PolynomialModel {
     pub time_constants: Vec<Option<Quantity>>,
 }
 
+/// Where |D(1)| is below this fraction of what it is a sum of, D has the root 1.
+const INTEGRATOR: f64 = 1e-9;
+
+impl PolynomialModel {
+    /// Whether the noise integrates, D(1) = 0: its level wanders without end.
+    pub fn noise_integrates(&self) -> bool {
+        let size: f64 = self.d.iter().map(|d| d.abs()).sum();
+        self.d.iter().sum::<f64>().abs() <= INTEGRATOR * size
+    }
+}
+
 /// One thing as a list of one.
 pub(super) mod only {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -21,7 +21,7 @@ use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method,
 use crate::inspect::is_few_sinusoids;
 use crate::model::{Interval, Orders, ProcessStructure, Quantity, Signal};
 use crate::respond::{Horizon, InitialCondition, innovations};
-use crate::select::{self, Automatic, Choice, Focus, SelectedModel, Task};
+use crate::select::{self, Automatic, Choice, Focus, SelectedModel, Selection, Task};
 use crate::{Document, Error};
 use in_states::InStates;
 use integrating::Integrating;
@@ -184,6 +184,11 @@ fn fit(
         Some(band) => band.record_alone(&estimation),
         None => estimation_rows(&log, plan, orders, &estimation),
     };
+    let drifts = selection.as_ref().is_some_and(|selection| selection.noise_integrates);
+    if drifts {
+        orders = select::drifting(&orders);
+        decisions.push(drift(&plan.output, &orders));
+    }
     let mut seen = rows(&orders)?;
     let task = estimate::Task {
         data: &seen,
@@ -193,8 +198,15 @@ fn fit(
         initial: plan.initial,
         monitor,
     };
-    let mut fitted = task.fit(plan.constant(), &beside, guess)?;
-    if let Some(selection) = selection.as_mut().filter(|selection| plan.puts_noise_behind(selection)) {
+    let mut fitted = match &method {
+        Method::PredictionError(search) if drifts => {
+            let estimate = estimate::with_noise_integrator(&seen, &orders, &plan.inputs, search, monitor)?;
+            Fitted::without_offset(estimate)
+        }
+        _ => task.fit(plan.constant(), &beside, guess)?,
+    };
+    let behind = |selection: &&mut Selection| !drifts && plan.puts_noise_behind(selection);
+    if let Some(selection) = selection.as_mut().filter(behind) {
         let order = estimate::noise_order(&seen, &orders, &fitted.estimate)?;
         if order > 0 {
             let Orders { nb, nf, nk, .. } = &orders;
@@ -226,7 +238,7 @@ fn fit(
         initial: plan.initial,
         monitor,
     };
-    if band.is_none() && fitted.offset.is_none() && plan.takes_output_offset() {
+    if band.is_none() && !drifts && fitted.offset.is_none() && plan.takes_output_offset() {
         let taken = Beside::new(&log, &segments, plan.detrend == Detrend::Linear)?;
         fitted.open = task.left_open(&taken, &fitted.estimate)?;
     }
@@ -261,6 +273,7 @@ fn fit(
     if let Some(rival) = rivals.integrating.filter(|_| !closed) {
         let record = log.record(&plan.inputs, &plan.output, &estimation)?;
         if let Some((report, decision)) = rival.instead(&model, &record, (sources, monitor))? {
+            decisions.retain(|other| other.kind != FindingKind::Drift);
             decisions.push(decision);
             let decisions = [decisions, report.decisions].concat();
             return Ok((PendingEvaluation::done(Report { selection, decisions, ..report }), log));
@@ -416,6 +429,7 @@ fn selected<'a>(
         select: plan.select,
         focus: if decision.is_some() && plan.focus == Focus::Auto { Focus::Prediction } else { plan.focus },
         initial: plan.initial,
+        may_drift: plan.initial == Initial::Auto && plan.prefilter.is_none() && !plan.trend,
         search,
         deadline: Deadline::after(search.time_limit),
         monitor,
@@ -465,6 +479,19 @@ fn without_delays<'c>(
     };
     let nk = Some(vec![1; inputs.len()]);
     (Cow::Owned(Choice::Automatic(Automatic { nk, ..automatic.clone() })), Some(decision))
+}
+
+/// What a drift of the output changes.
+fn drift(output: &str, orders: &Orders) -> Decision {
+    Decision {
+        kind: FindingKind::Drift,
+        channels: vec![output.to_owned()],
+        because: format!("the level of output '{output}' wanders, and no input makes it"),
+        did: format!(
+            "the noise of {orders} integrates (D has the root 1), free runs have a level of their own in each window, and no offset is known"
+        ),
+        instead: "`model` oe, or orders".to_owned(),
+    }
 }
 
 /// The variance of the errors one step ahead of the unfiltered signals, sum e^2/(N - p) over the estimation rows.

@@ -25,7 +25,7 @@ use crate::model::PolynomialModel;
 /// ```
 ///
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
-/// can do. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are
+/// can do. Where the noise integrates, D(1) = 0, a constant is among them: its level before the segment is not known. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are
 /// taken to be zero, unless estimating them is worth its parameters by the rule of
 /// [`Initial::Auto`](crate::estimate::Initial::Auto). Segments too short for a start are left out.
 ///
@@ -104,6 +104,9 @@ pub fn simulate(
     Ok(Response::of_runs(record.output.len(), runs, counted))
 }
 
+/// 1 - q^-1.
+const INTEGRATOR: [f64; 2] = [1.0, -1.0];
+
 /// The free run of a segment.
 #[derive(Debug)]
 struct Run {
@@ -119,7 +122,7 @@ struct Free<'a> {
     output: &'a [f64],
     /// Free runs from zero but for known inputs.
     runs: Vec<Run>,
-    /// The responses of 1/A, and of 1/(A F_j) for each input with F.
+    /// The responses of 1/A, of 1/(A F_j) for each input with F, and of 1/(1 - q^-1) where the noise integrates.
     responses: Vec<Vec<f64>>,
 }
 
@@ -128,7 +131,7 @@ impl<'a> Free<'a> {
         Self { model, output: record.output, runs: Vec::new(), responses: Vec::new() }
     }
 
-    /// How many initial-condition responses of 1/A, and of each 1/(A F_j), make up for what is unknown before a segment.
+    /// How many initial-condition responses of 1/A, of each 1/(A F_j), and of 1/(1 - q^-1) make up for what is unknown before a segment.
     fn counts(&self, past: usize, with_inputs: bool) -> Vec<usize> {
         let orders = &self.model.orders;
         let inputs = 0..orders.inputs();
@@ -136,7 +139,8 @@ impl<'a> Free<'a> {
         let filtered = inputs
             .filter(|&input| orders.nf[input] > 0)
             .map(|input| if with_inputs { orders.nf[input].max(unknown(input)) } else { orders.nf[input] });
-        std::iter::once(orders.conditioned() - orders.nd).chain(filtered).collect()
+        let level = self.model.noise_integrates().then_some(1);
+        std::iter::once(orders.conditioned() - orders.nd).chain(filtered).chain(level).collect()
     }
 
     /// The runs with the initial conditions that fit best.
@@ -148,7 +152,8 @@ impl<'a> Free<'a> {
         };
         let a = &self.model.a;
         let filtered = self.model.f.iter().filter(|f| f.len() > 1).map(|f| response(&[a, f]));
-        self.responses = std::iter::once(response(&[a])).chain(filtered).collect();
+        let level = self.model.noise_integrates().then(|| response(&[&INTEGRATOR]));
+        self.responses = std::iter::once(response(&[a])).chain(filtered).chain(level).collect();
         let all = |with_inputs: bool| -> Result<Vec<Completed>, Error> {
             let each = self.runs.iter().enumerate();
             each.filter_map(|(index, run)| self.complete(index, run, with_inputs).transpose()).collect()

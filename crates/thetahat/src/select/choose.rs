@@ -66,6 +66,7 @@ pub fn choose_orders(
         select,
         focus: Focus::Auto,
         initial: Initial::Auto,
+        may_drift: true,
         search: &search,
         deadline: Deadline::after(search.time_limit),
         monitor,
@@ -97,7 +98,8 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<SelectedModel, 
     // Who gives ranges asks for the criterion.
     let gated = matches!(choice, Choice::Automatic(_)) && inputs > 0;
     let focus = if task.focus == Focus::Auto && !gated { Focus::Prediction } else { task.focus };
-    let task = &Task { focus, ..*task };
+    let may_drift = task.may_drift && gated;
+    let task = &Task { focus, may_drift, ..*task };
     match choice {
         Choice::Known(orders) => {
             let outcome = compare::compare(task, vec![orders.clone()])?;

@@ -1,6 +1,7 @@
 //! All models on the same samples.
 
 use super::candidates::{Compared, Samples, Trial, energy, rows, total};
+use super::drift::{self, Drift};
 use super::linear::{Columns, Fitted, Scaled};
 use super::search::Family;
 use super::{Candidate, EXACT, Select, Task, held_out, held_out_mse};
@@ -27,6 +28,8 @@ pub(super) struct Outcome {
     pub(super) samples: usize,
     /// What there is to say of the samples, in sentences.
     pub(super) remarks: Vec<String>,
+    /// Whether the noise drifts.
+    pub(super) drift: Option<Drift>,
 }
 
 /// Fits all models to the same samples. Each model is there once.
@@ -86,7 +89,8 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
             score(task.select, mse, orders.parameters(), price(orders, *initial), count, *held_out_mse)
         })
         .collect();
-    let held_out = if with_blocks && !task.deadline.is_over() {
+    let mut drift = None;
+    let held_out = if (with_blocks || task.may_drift) && !task.deadline.is_over() {
         // An exact model has no criterion, and is the best.
         let place = |k: usize| {
             let exact = tried[k].point.as_ref().is_some_and(|point| exact(point.cost) == 0.0);
@@ -94,9 +98,19 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         };
         let mut order: Vec<usize> = (0..tried.len()).filter(|&k| tried[k].point.is_some()).collect();
         order.sort_by(|&a, &b| place(a).total_cmp(&place(b)));
+        let is_stable = |k: &&usize| {
+            let point = tried[**k].point.as_ref();
+            point.is_some_and(|point| held_out::radius(&tried[**k].orders, &point.parameters) < 1.0)
+        };
+        if task.may_drift
+            && let Some(&best) = order.iter().find(is_stable)
+        {
+            drift = drift::drift(task, record, &tried[best])?;
+        }
         let record = few_for_blocks(record, task.estimation);
         let samples = Samples::unknown(&record, tried.iter().map(|model| &model.orders));
-        held_out::figures(task, &record, &samples, &tried, &held_out::promising(&order, &tried))?
+        let which = if with_blocks { held_out::promising(&order, &tried) } else { Vec::new() };
+        held_out::figures(task, &record, &samples, &tried, &which, drift.map(|drift| drift.window))?
     } else {
         vec![None; tried.len()]
     };
@@ -124,7 +138,7 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         },
     );
     let models: Vec<Compared> = models.collect();
-    Ok(Outcome { failed: total - models.len(), models, samples: count, smallest, remarks })
+    Ok(Outcome { failed: total - models.len(), models, samples: count, smallest, remarks, drift })
 }
 
 /// The part of a record that blocks are held out of: of a long one segments of all there is.

@@ -54,6 +54,7 @@ pub(super) fn figures(
     samples: &Samples,
     tried: &[Trial],
     which: &[usize],
+    window: Option<usize>,
 ) -> Result<Vec<Option<Seen>>, Error> {
     let mut figures = vec![None; tried.len()];
     let deviation = deviation(record);
@@ -63,7 +64,7 @@ pub(super) fn figures(
         return Ok(figures);
     }
     let refits = folds.refitted(task, samples, &some)?;
-    let blocks = Blocks::new(record, &folds, deviation);
+    let blocks = Blocks::new(record, &folds, deviation, window);
     let horizon = task.focus.horizon();
     let of_model = |k: usize| -> Option<Seen> {
         let orders = &some[k].orders;
@@ -176,13 +177,20 @@ pub(super) struct Blocks<'r> {
     tests: Vec<Record<'r>>,
     onward: Onward<'r>,
     deviation: f64,
+    /// Windows of this many samples have levels of their own, where the noise drifts.
+    window: Option<usize>,
 }
 
 impl<'r> Blocks<'r> {
     /// `deviation` is that of the output, not 0.
-    pub(super) fn new(record: &Record<'r>, folds: &Folds<'_, 'r>, deviation: f64) -> Self {
+    pub(super) fn new(
+        record: &Record<'r>,
+        folds: &Folds<'_, 'r>,
+        deviation: f64,
+        window: Option<usize>,
+    ) -> Self {
         let tests = (0..folds.count()).map(|fold| folds.test_with_past(fold)).collect();
-        Self { tests, onward: Onward::new(record, folds), deviation }
+        Self { tests, onward: Onward::new(record, folds), deviation, window }
     }
 
     /// The figures of models, each fitted without the block of its place, and whether they are stable; `respond` says what one makes of a
@@ -200,13 +208,11 @@ impl<'r> Blocks<'r> {
             let count = total(test);
             let root = match respond(model, test, horizon) {
                 Ok(response) => {
-                    let pairs = counted(test, &response);
-                    let count = pairs.clone().count();
-                    pairs
-                        .clone()
-                        .enumerate()
-                        .for_each(|(k, pair)| parts[k * PARTS / count] += cut(pair, deviation).powi(2));
-                    root(pairs, deviation)?
+                    let pairs = leveled(counted(test, &response).collect(), self.window);
+                    let count = pairs.len();
+                    let each = pairs.iter().enumerate();
+                    each.for_each(|(k, pair)| parts[k * PARTS / count] += cut(*pair, deviation).powi(2));
+                    root(pairs.iter().copied(), deviation)?
                 }
                 Err(_) => LARGEST,
             };
@@ -221,7 +227,7 @@ impl<'r> Blocks<'r> {
         let onward = match horizon {
             Horizon::FreeRun => {
                 let run = |record: &Record<'_>| respond(last, record, horizon);
-                let root = self.onward.root_mean_square(run, deviation).unwrap_or(LARGEST);
+                let root = self.onward.root_mean_square(run, deviation, self.window).unwrap_or(LARGEST);
                 if *stable { root * root } else { punished(root).powi(2) }
             }
             Horizon::Steps { .. } => mean(blocks),
@@ -255,6 +261,7 @@ impl<'r> Onward<'r> {
         &self,
         run: impl Fn(&Record<'_>) -> Result<Response, Error>,
         deviation: f64,
+        window: Option<usize>,
     ) -> Option<f64> {
         let begins = |segment: &std::ops::Range<usize>| self.known[segment.start].is_nan();
         let (mut before, mut alone) = (self.record.clone(), self.last.clone());
@@ -278,6 +285,21 @@ impl<'r> Onward<'r> {
             let response = run(&alone).ok()?;
             pairs.extend(counted(&alone, &response));
         }
-        root(pairs.iter().copied(), deviation)
+        root(leveled(pairs, window).iter().copied(), deviation)
     }
+}
+
+/// Values and what was said of them, in windows with the level that fits each best.
+fn leveled(mut pairs: Vec<(f64, f64)>, window: Option<usize>) -> Vec<(f64, f64)> {
+    let Some(window) = window else { return pairs };
+    // Windows as long as one another to within one sample.
+    let count = (pairs.len() / window).max(1);
+    let mut rest = pairs.as_mut_slice();
+    for left in (1..=count).rev() {
+        let (own, others) = rest.split_at_mut(rest.len() / left);
+        let mean = sum(own.iter().map(|(measured, said)| measured - said)) / own.len().max(1) as f64;
+        own.iter_mut().for_each(|(_, said)| *said += mean);
+        rest = others;
+    }
+    pairs
 }

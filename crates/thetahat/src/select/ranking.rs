@@ -21,7 +21,7 @@ const CLOSE: f64 = 0.01;
 /// # Errors
 /// What a fit of the smallest model says, if the data determine none.
 pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<SelectedModel, Error> {
-    let Outcome { models: compared, failed, samples, remarks, smallest } = outcome;
+    let Outcome { models: compared, failed, samples, remarks, smallest, drift } = outcome;
     let by_held_out_mse = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
     compared.sort_by(|a, b| better(&a.scored, &b.scored, by_held_out_mse));
@@ -103,6 +103,8 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         least: by_held_out_mse.then(|| first.clone()),
         best: order.iter().take(BEST).copied().cloned().collect(),
         of_size,
+        level_window: drift.map(|drift| drift.window),
+        noise_integrates: drift.is_some_and(|drift| drift.integrates),
         processes: Vec::new(),
         state_space: None,
     };

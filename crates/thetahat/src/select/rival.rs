@@ -12,9 +12,10 @@ use crate::data::Record;
 use crate::respond::{Horizon, Response};
 
 /// What models do on blocks that they were not fitted to: `fit` gives one for a record without a block, and whether it is stable, `respond`
-/// the free run of a record. None where a record without a block does not determine one.
+/// the free run of a record; windows of so many samples have levels of their own. None where a record without a block does not determine one.
 pub(crate) fn on_blocks<M: Send>(
     record: &Record<'_>,
+    window: Option<usize>,
     fit: impl Fn(&Record<'_>) -> Option<(bool, M)> + Sync,
     respond: impl Fn(&M, &Record<'_>) -> Result<Response, Error>,
 ) -> Option<HeldOut> {
@@ -25,7 +26,7 @@ pub(crate) fn on_blocks<M: Send>(
     }
     let refit = |block: usize| fit(&folds.training(block));
     let refits = (0..BLOCKS).into_par_iter().map(refit).collect::<Option<Vec<_>>>()?;
-    let blocks = Blocks::new(record, &folds, deviation);
+    let blocks = Blocks::new(record, &folds, deviation, window);
     let figures = blocks.figures(&refits, Horizon::FreeRun, |model, record, _| respond(model, record));
     figures.map(|(seen, _)| seen)
 }

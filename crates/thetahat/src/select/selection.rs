@@ -48,6 +48,13 @@ pub struct Selection {
     pub best: Vec<Candidate>,
     /// The best of each number of parameters, the smallest first.
     pub of_size: Vec<Candidate>,
+    /// Free runs on blocks were compared in windows of this many samples, each with a level of its own, as the noise drifts; none where it
+    /// does not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub level_window: Option<usize>,
+    /// Whether the noise of the model integrates, 1 - q^-1 in D in the place of a root that is estimated, as MDL is less with it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub noise_integrates: bool,
     /// The processes in continuous time that were compared with `chosen`, where the log is a step test, the best first. That one is
     /// the model of the report, or `chosen` is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -72,7 +72,7 @@ pub(crate) fn states(
     if selection.has_rivals()
         && task.looks_further()
         && !task.deadline.is_over()
-        && let Some((candidate, radius)) = candidate(task, constant)
+        && let Some((candidate, radius)) = candidate(task, constant, selection.level_window)
     {
         let order = candidate.order;
         let (is_taken, why) = verdict(&candidate, radius <= slowest(total(task.estimation)), &selection);
@@ -99,7 +99,11 @@ fn verdict(candidate: &StateSpaceCandidate, is_fast: bool, selection: &Selection
 }
 
 /// The model of the order of the least MDL, and the largest modulus of its poles; none where the record has none.
-fn candidate(task: &Task<'_>, constant: Constant) -> Option<(StateSpaceCandidate, f64)> {
+fn candidate(
+    task: &Task<'_>,
+    constant: Constant,
+    window: Option<usize>,
+) -> Option<(StateSpaceCandidate, f64)> {
     let whole = task.named_record();
     let found = Ordered::new(&joint(&whole), &SubspaceOptions::default(), None, constant).ok()?;
     let Ordered { subspace: states, order, scores, .. } = found;
@@ -112,17 +116,22 @@ fn candidate(task: &Task<'_>, constant: Constant) -> Option<(StateSpaceCandidate
         ..SubspaceOptions::default()
     };
     let parameters = states.free_parameters(order);
-    let held_out = held_out(&few_for_blocks(&whole, &whole), &options, order);
+    let held_out = held_out(&few_for_blocks(&whole, &whole), window, &options, order);
     Some((StateSpaceCandidate { order, parameters, orders: scores, held_out }, radius))
 }
 
 /// What models of an order do on blocks that they were not fitted to; none where the rows without one do not determine them.
-fn held_out(record: &Record<'_>, options: &SubspaceOptions, order: usize) -> Option<HeldOut> {
+fn held_out(
+    record: &Record<'_>,
+    window: Option<usize>,
+    options: &SubspaceOptions,
+    order: usize,
+) -> Option<HeldOut> {
     let fit = |training: &Record<'_>| {
         let states = subspace(&joint(training), options).ok()?;
         let model = states.state_space(order, 1.0).ok()?;
         let level = states.levels(order)?.first().copied()?;
         Some((is_stable(&model.f), Refit { model, level }))
     };
-    on_blocks(record, fit, |refit, record| refit.run(record))
+    on_blocks(record, window, fit, |refit, record| refit.run(record))
 }

@@ -18,6 +18,8 @@ pub(crate) struct Task<'a> {
     pub(crate) focus: Focus,
     pub(crate) initial: Initial,
     pub(crate) search: &'a Search,
+    /// Whether a drift of the noise is looked for.
+    pub(crate) may_drift: bool,
     /// Of all its searches.
     pub(crate) deadline: Deadline,
     pub(crate) monitor: Monitor<'a>,

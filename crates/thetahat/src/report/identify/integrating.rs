@@ -23,6 +23,8 @@ const LENGTHS: f64 = 0.5;
 const CERTAIN: f64 = 3.0;
 /// The mean square of the errors of a process may be this many times that of the polynomial model, which has more parameters.
 const CLOSE: f64 = 1.1;
+/// The same beside a model whose noise integrates.
+const FAR: f64 = 0.5;
 
 /// A log as it was read, and how a process is fitted to it.
 pub(super) struct Integrating<'l> {
@@ -38,7 +40,7 @@ impl<'l> Integrating<'l> {
         open.then_some(Self { log, plan: own })
     }
 
-    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, and why it is taken; none of other models,
+    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, or far closer than one whose noise integrates, and why it is taken; none of other models,
     /// and where no process comes as close.
     ///
     /// # Errors
@@ -50,7 +52,15 @@ impl<'l> Integrating<'l> {
         (sources, monitor): (&[Source], Monitor<'_>),
     ) -> Result<Option<(Report, Decision)>, Error> {
         let samples: usize = record.segments.iter().map(std::ops::Range::len).sum();
-        let Some(pole) = slowest(model, samples) else { return Ok(None) };
+        // A noise that integrates follows the sum of an input too, but a free run with it does not.
+        let (limit, evidence) = match slowest(model, samples) {
+            _ if model.noise_integrates() => (FAR, "in free runs".to_owned()),
+            Some(Quantity { value, standard_error, .. }) => {
+                let spread = standard_error.map_or_else(String::new, |error| format!(" ± {}", short(error)));
+                (CLOSE, format!("with a pole at {}{spread}", short(value)))
+            }
+            None => return Ok(None),
+        };
         let Some(square) = free_run(model, record) else { return Ok(None) };
         let mut best: Option<(f64, Report)> = None;
         for structure in STRUCTURES {
@@ -72,20 +82,19 @@ impl<'l> Integrating<'l> {
                 .find(|fit| fit.part == Some(Part::Estimation) && fit.horizon == Horizon::FreeRun);
             own.and_then(|fit| fit.rmse).map_or(f64::INFINITY, |rmse| rmse * rmse)
         };
-        let taken = best.filter(|(_, report)| free(report) <= CLOSE * square).map(|(_, report)| report);
+        let taken = best.filter(|(_, report)| free(report) <= limit * square).map(|(_, report)| report);
         Ok(taken.map(|report| {
-            let spread = pole.standard_error.map_or_else(String::new, |error| format!(" ± {}", short(error)));
+            let how = if limit < 1.0 { "far closer" } else { "as close" };
             let decision = Decision {
                 kind: FindingKind::Integration,
                 channels: vec![model.output.name.clone()],
                 because: format!(
-                    "'{}' follows the sum of '{}', with a pole at {}{spread}",
+                    "'{}' follows the sum of '{}', {evidence}",
                     model.output.name,
-                    self.plan.inputs.concat(),
-                    short(pole.value)
+                    self.plan.inputs.concat()
                 ),
                 did: format!(
-                    "a process with an integrator is taken, {}, as it is as close",
+                    "a process with an integrator is taken, {}, as it is {how}",
                     report.model.name()
                 ),
                 instead: "`model`".to_owned(),

@@ -130,7 +130,7 @@ impl<'l> Nonlinear<'l> {
         let whole = task.named_record();
         let record = few_for_blocks(&whole, &whole);
         let run = |plan: NonlinearArxPlan, what: String| {
-            let seen = self.on_blocks(&record, &plan, task.monitor)?;
+            let seen = self.on_blocks(&record, selection.level_window, &plan, task.monitor)?;
             Some(Rival { plan, what, seen })
         };
         let of_degree = |plan: &NonlinearArxPlan, degree: usize| {
@@ -200,6 +200,7 @@ impl<'l> Nonlinear<'l> {
     fn on_blocks(
         &self,
         record: &Record<'_>,
+        window: Option<usize>,
         plan: &NonlinearArxPlan,
         monitor: Monitor<'_>,
     ) -> Option<HeldOut> {
@@ -223,7 +224,7 @@ impl<'l> Nonlinear<'l> {
             let report = fit_planned(self.log, &[], &plan, monitor).ok()?;
             Some((true, report.model))
         };
-        on_blocks(record, fit, |model, record| {
+        on_blocks(record, window, fit, |model, record| {
             let said = apply(model, self.log, &rows(record), None, Horizon::FreeRun, InitialCondition::Drop)?;
             let Some(said) = said.outputs.first() else { return Err(Error::data("the model has no output")) };
             let counted = record.segments.iter().flat_map(|rows| {

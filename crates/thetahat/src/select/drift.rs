@@ -17,6 +17,10 @@ use crate::model::{Orders, polynomial::roots};
 const SLOW: f64 = 0.9;
 /// Nor does one whose time constant is less than this many times that of the plant.
 const SLOWER: f64 = 2.0;
+/// Blocks average over a noise whose time constant is less than this fraction of the samples.
+const MOST: f64 = 50.0;
+/// A random walk shows where it is above white noise after less than this fraction of the samples.
+const LEAST: f64 = 20.0;
 /// Windows are this many time constants of the slowest pole long, and no shorter than this.
 const SETTLED: f64 = 4.0;
 const SHORTEST: usize = 64;
@@ -53,8 +57,8 @@ pub(super) struct Drift {
 pub(super) fn drift(task: &Task<'_>, record: &Record<'_>, model: &Trial) -> Result<Option<Drift>, Error> {
     let Some(point) = &model.point else { return Ok(None) };
     let orders = &model.orders;
-    let before = orders.na + orders.nb.iter().sum::<usize>() + orders.nc;
-    let own = if orders.nd > 0 { before..before + orders.nd } else { 0..orders.na };
+    let after_c = before_c(orders) + orders.nc;
+    let own = if orders.nd > 0 { after_c..after_c + orders.nd } else { 0..orders.na };
     let noise = slowest_real(&point.parameters[own]);
     let Some(with) = integrating(orders).filter(|_| noise > SLOW) else { return Ok(None) };
     let method = Method::PredictionError(task.search.clone());
@@ -76,10 +80,23 @@ pub(super) fn drift(task: &Task<'_>, record: &Record<'_>, model: &Trial) -> Resu
     let plant =
         if integrates { radius(&with, integrated.parameters()) } else { radius(orders, &point.parameters) };
     let time = |root: f64| -1.0 / root.min(1.0 - 1e-9).ln();
-    if !integrates && (orders.nd == 0 || time(noise) < SLOWER * time(plant)) {
+    let (samples, first) = (free.samples() as f64, before_c(&with));
+    let white = slowest_real(&integrated.parameters()[first..first + with.nc]);
+    let drifts = if integrates {
+        // A root of C beside the 1 of D says that there is neither.
+        time(white) < samples / LEAST
+    } else {
+        orders.nd > 0 && time(noise) > (SLOWER * time(plant)).max(samples / MOST)
+    };
+    if !drifts {
         return Ok(None);
     }
     Ok(Some(Drift { window: ((SETTLED * time(plant)) as usize).max(SHORTEST), integrates }))
+}
+
+/// The place of the first parameter of C.
+fn before_c(orders: &Orders) -> usize {
+    orders.na + orders.nb.iter().sum::<usize>()
 }
 
 /// The largest real root of a monic polynomial that has these coefficients after the first; 0 where none is positive.

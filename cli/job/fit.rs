@@ -36,6 +36,8 @@ pub(crate) struct FitJob {
     pub(crate) method: Method,
     pub(crate) initial: Initial,
     pub(crate) constant: Constant,
+    /// Whether a norm was given.
+    pub(crate) uses_outliers: bool,
     pub(crate) trend: bool,
 }
 
@@ -64,6 +66,7 @@ impl FitJob {
                 ConstantArgument::No => Constant::No,
             },
             trend: arguments.model.trend,
+            uses_outliers: arguments.criterion.norm.is_some(),
             orders,
         };
         if !job.orders.is_linear() || job.orders.is_choice() || !job.is_plain() || arguments.html.is_some() {
@@ -127,6 +130,7 @@ impl FitJob {
             initial: self.initial,
             constant: self.constant,
             trend: self.trend,
+            uses_outliers: self.uses_outliers,
         })
     }
 }

@@ -43,6 +43,7 @@ mod tests;
 mod topics;
 mod whitening;
 
+pub(crate) use channel::outliers_of;
 pub(crate) use excitation::{excitation, is_few_sinusoids, order_with_mean};
 pub use inspection::{
     ChannelQuality, Clock, DelayEstimate, Excitation, Feedback, Inspection, Saturation, SpectrumPoint,

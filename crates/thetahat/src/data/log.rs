@@ -475,6 +475,16 @@ impl Log {
         segments
     }
 
+    /// The log without the values of a channel at some of its rows (from 1), in place.
+    pub(crate) fn forget(&mut self, name: &str, rows: &[usize]) {
+        let Some(place) = self.channels.iter().position(|channel| channel.name == name) else { return };
+        let values = &mut self.channels[place].values;
+        for row in rows.iter().filter_map(|row| row.checked_sub(1)) {
+            values[row] = f64::NAN;
+        }
+        self.missing[place] = Contents::of(values).missing;
+    }
+
     /// The log with an offset taken from one of its channels, in place.
     pub(crate) fn remove(&mut self, name: &str, offset: &Offset) {
         let Some(position) = self.channels.iter().position(|channel| channel.name == name) else {

@@ -4,7 +4,8 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::named::{NAMED, ranges};
 use super::{ChannelQuality, moments, outliers, quantization, saturation};
-use crate::data::{Channel, Rows, Times};
+use crate::Error;
+use crate::data::{Channel, Log, Rows, Times};
 
 /// An outlier so many rows from a jump of another channel is an answer to it, or what it answers.
 const ANSWERS: usize = 10;
@@ -29,9 +30,16 @@ pub(super) fn jumps(values: &[f64]) -> Vec<usize> {
     (1..values.len()).filter(|row| is_jump(changes[row - 1])).collect()
 }
 
-/// Takes the outliers out of a channel that other channels explain, by the rows (0-based, sorted) at which these jump: where more of them
-/// lie near jumps than chance brings there once in a hundred times.
+/// Takes the outliers out of a channel that other channels explain.
 pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usize], rows: usize) {
+    let left = unexplained(all, jumps, rows);
+    quality.outlier_count = left.len();
+    quality.outliers = left.into_iter().take(NAMED).collect();
+}
+
+/// The outliers (rows from 1) that other channels do not explain, by the rows (0-based, sorted) at which these jump: all, but for those near
+/// jumps where more lie there than chance brings once in a hundred times.
+fn unexplained(all: &[usize], jumps: &[usize], rows: usize) -> Vec<usize> {
     let near = |row: usize| {
         let next = jumps.partition_point(|jump| jump + ANSWERS < row);
         jumps.get(next).is_some_and(|jump| *jump <= row + ANSWERS)
@@ -40,11 +48,31 @@ pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usiz
     let explained = all.iter().filter(|row| near(**row - 1)).count() as u64;
     let by_chance = Binomial::new(covered, all.len() as u64);
     if explained == 0 || by_chance.map_or(1.0, |chance| chance.sf(explained - 1)) > CHANCE {
-        return;
+        return all.to_vec();
     }
-    let left: Vec<usize> = all.iter().copied().filter(|row| !near(row - 1)).collect();
-    quality.outlier_count = left.len();
-    quality.outliers = left.into_iter().take(NAMED).collect();
+    all.iter().copied().filter(|row| !near(row - 1)).collect()
+}
+
+/// The rows (from 1) of the outliers of a channel that others do not explain. O(N log N).
+///
+/// # Errors
+/// [`Error::Data`] for a channel that is not there.
+pub(crate) fn outliers_of(log: &Log, name: &str, others: &[String]) -> Result<Vec<usize>, Error> {
+    let values = &log.channel(name)?.values;
+    let rows: Vec<usize> = (0..values.len()).filter(|&row| !values[row].is_nan()).collect();
+    let scale = moments::scale(rows.iter().map(|&row| values[row]));
+    let scaled: Vec<f64> = rows.iter().map(|&row| scale * values[row]).collect();
+    let far: Vec<usize> =
+        outliers::outliers(&scaled).into_iter().map(|position| rows[position] + 1).collect();
+    if far.is_empty() {
+        return Ok(far);
+    }
+    let mut all = Vec::new();
+    for other in others {
+        all.extend(jumps(&log.channel(other)?.values));
+    }
+    all.sort_unstable();
+    Ok(unexplained(&far, &all, values.len()))
 }
 
 /// A run of equal values of so many rows may be a sensor that is stuck.

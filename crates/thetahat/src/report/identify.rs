@@ -18,7 +18,7 @@ use super::shares::Shares;
 use super::warnings::warnings;
 use crate::data::{Decision, Detrend, FindingKind, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
-use crate::inspect::is_few_sinusoids;
+use crate::inspect::{is_few_sinusoids, outliers_of};
 use crate::model::{Interval, Orders, ProcessStructure, Quantity, Signal};
 use crate::respond::{Horizon, InitialCondition, innovations};
 use crate::select::{self, Automatic, Choice, Focus, SelectedModel, Selection, Task};
@@ -30,6 +30,8 @@ use step_test::StepTest;
 
 /// Below this fraction of a channel's size, what detrending leaves is rounding.
 pub(super) const ROUNDING: f64 = 1e-13;
+/// So many rows are named.
+const LISTED: usize = 5;
 
 /// Fits a model to a log and reports on it: the whole way from data to figures.
 ///
@@ -100,6 +102,13 @@ fn fit(
     let Shares { estimation, validation, parts } =
         Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let digests = digests(&log, &names, &estimation)?;
+    let missing =
+        names.iter().map(|name| Ok(Missing { channel: (*name).to_owned(), rows: log.missing(name)? }));
+    let missing = missing.collect::<Result<Vec<_>, Error>>()?;
+    let mut decisions = Vec::new();
+    if matches!(plan.choice, Choice::Automatic(_)) && !plan.uses_outliers {
+        decisions.extend(without_outliers(&mut log, plan, &estimation)?);
+    }
     let segments = log.segments(&names, &estimation)?;
     if segments.is_empty() {
         return Err(Error::data(
@@ -116,10 +125,6 @@ fn fit(
             orders,
         )?;
     }
-    let missing =
-        names.iter().map(|name| Ok(Missing { channel: (*name).to_owned(), rows: log.missing(name)? }));
-    let missing = missing.collect::<Result<Vec<_>, Error>>()?;
-
     let compared = Compared {
         estimation: parts.as_ref().map_or(&estimation, |parts| &parts.estimation),
         validation: parts.as_ref().map_or(&validation, |parts| &parts.validation),
@@ -149,14 +154,13 @@ fn fit(
         None => log.record(&plan.inputs, &plan.output, rows),
     };
     let mut method = plan.method.clone();
-    let mut decisions = Vec::new();
     let (mut selection, mut orders, guess) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
             let Chosen { found, with_constant, process, order, nonlinear } =
                 selected(&record, plan, &compared, &beside, &rivals, (sources, monitor))?;
             let SelectedModel { selection, decisions: found, mut guess } = found;
-            decisions = found;
+            decisions.extend(found);
             if let Some((structure, test)) = process.zip(rivals.step_test) {
                 let report = test.fit(structure, selection, decisions, (sources, monitor))?;
                 return Ok((PendingEvaluation::done(report), log));
@@ -315,6 +319,35 @@ fn fit(
     let grid = if let Choice::Grid(grid) = &plan.choice { Some(grid.clone()) } else { None };
     let open = Open::Polynomial(OpenPolynomial { model, grid, focus: plan.focus, taken }.into());
     Ok((PendingEvaluation::open(report, open), log))
+}
+
+/// Takes the outliers of the output for missing in the rows to estimate on; and what is to be said of it.
+fn without_outliers(log: &mut Log, plan: &Plan, rows: &[Rows]) -> Result<Option<Decision>, Error> {
+    let all = outliers_of(log, &plan.output, &plan.inputs)?;
+    let far: Vec<usize> = all
+        .into_iter()
+        .filter(|row| rows.iter().any(|rows| (rows.first()..=rows.last()).contains(row)))
+        .collect();
+    let shown: Vec<String> = far.iter().take(LISTED).map(ToString::to_string).collect();
+    if shown.is_empty() {
+        return Ok(None);
+    }
+    log.forget(&plan.output, &far);
+    let (plural, more) =
+        if far.len() == 1 { ("", "") } else { ("s", if far.len() > LISTED { ", …" } else { "" }) };
+    Ok(Some(Decision {
+        kind: FindingKind::Outliers,
+        channels: vec![plan.output.clone()],
+        because: format!(
+            "output '{}' has {} value{plural} far from {} neighbours, at row{plural} {}{more}",
+            plan.output,
+            far.len(),
+            if far.len() == 1 { "its" } else { "their" },
+            shown.join(", ")
+        ),
+        did: format!("{} taken for missing", if far.len() == 1 { "it is" } else { "they are" }),
+        instead: "`norm` 2".to_owned(),
+    }))
 }
 
 /// The channels that a plan names, which the log has, the inputs first.

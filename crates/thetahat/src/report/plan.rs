@@ -43,6 +43,8 @@ pub struct Plan {
     pub constant: Constant,
     /// Whether a slope of the output is estimated with the parameters, and the level with it.
     pub trend: bool,
+    /// Whether outliers of the output count as other values do. Where the data choose the orders they are taken for missing otherwise.
+    pub uses_outliers: bool,
 }
 
 impl Plan {
@@ -64,6 +66,7 @@ impl Plan {
             initial: Initial::default(),
             constant: Constant::default(),
             trend: false,
+            uses_outliers: false,
         }
     }
 

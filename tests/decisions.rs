@@ -169,3 +169,59 @@ fn a_plant_far_from_linear_gets_a_nonlinear_model() {
     };
     assert!(free_run(&nonlinear) > free_run(&linear) + 5.0, "{} {}", free_run(&nonlinear), free_run(&linear));
 }
+
+#[test]
+fn a_level_that_wanders_is_noise_that_integrates() {
+    // A random walk beside a first order: y(t) = 0.9 y(t-1) + 0.2 u(t-2) at its own level.
+    let mut random = Random::new(27);
+    let u = telegraph(&mut random, 2000, 12);
+    let plant = response(&[1.0, -0.9], &[(&[0.0, 0.0, 0.2], &u)], &[0.0; 2000]);
+    let mut level = 0.0;
+    let drifting = plant.iter().map(|value| {
+        level += 0.05 * random.uniform();
+        value + level + 0.1 * random.uniform()
+    });
+    let y: Vec<f64> = drifting.collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let report = folder.fit("log.csv --report drift.json");
+    assert_eq!(kinds(&report), ["drift"]);
+    assert_eq!(report["selection"]["noise_integrates"], json!(true));
+    let d = report["model"]["d"].as_array().expect("D is a list");
+    assert!(d.iter().filter_map(Value::as_f64).sum::<f64>().abs() < 1e-12, "{d:?}");
+    let gain = number(&report, "/model/dc_gain/0/value");
+    assert!((gain - 2.0).abs() < 0.05, "{gain}");
+    // Free runs have a level of their own: that of another day is found with the state.
+    let other: Vec<f64> = plant.iter().map(|value| value + 40.0).collect();
+    folder.write("other.csv", csv(&[("u", &u), ("y", &other)]));
+    let free = folder.done("validate drift.json other.csv --format json").stdout;
+    let free: Value = serde_json::from_str(&free).expect("the document is JSON");
+    let runs = free["fit"].as_array().into_iter().flatten();
+    let percent =
+        runs.filter(|fit| fit["horizon"]["kind"] == "free-run").filter_map(|fit| fit["percent"].as_f64());
+    assert!(percent.clone().count() == 1 && percent.min_by(f64::total_cmp) > Some(97.0), "{}", free["fit"]);
+    // Whoever asks for a structure has it.
+    assert_eq!(kinds(&folder.fit("log.csv --model oe")), [""; 0]);
+}
+
+#[test]
+fn values_far_from_their_neighbours_are_taken_for_missing() {
+    let mut random = Random::new(28);
+    let u = telegraph(&mut random, 1000, 7);
+    let plant = response(&[1.0, -0.8], &[(&[0.0, 0.4], &u)], &[0.0; 1000]);
+    let mut y: Vec<f64> = plant.iter().map(|value| value + 0.05 * random.uniform()).collect();
+    for (row, by) in [(99, 9.0), (340, -12.0), (341, 11.0), (700, 6.0)] {
+        y[row] += by;
+    }
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    let report = folder.fit("log.csv");
+    assert_eq!(kinds(&report), ["outliers"]);
+    let because = report["decisions"][0]["because"].as_str().expect("it is a sentence");
+    assert!(because.ends_with("at rows 100, 341, 342, 701"), "{because}");
+    // They are no missing values of the log.
+    assert_eq!(report["data"]["missing"][1]["rows"], json!(0), "{}", report["data"]["missing"]);
+    let gain = |report: &Value| number(report, "/model/dc_gain/0/value");
+    assert!((gain(&report) - 2.0).abs() < 0.01, "{}", gain(&report));
+    let all = folder.fit("log.csv --norm 2");
+    assert_eq!(kinds(&all), [""; 0]);
+    assert!(number(&all, "/estimation/mse") > 20.0 * number(&report, "/estimation/mse"));
+}

@@ -73,3 +73,41 @@ impl Estimate {
         Self { parameters: parameters.collect(), covariance, initial, ..self }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::*;
+    use crate::estimate::Procedure;
+
+    /// y = 0.2 q^-1/(1 - 0.8 q^-1) u + (1 - 0.5 q^-1)/((1 - q^-1)(1 - 0.3 q^-1)) e.
+    #[test]
+    fn the_root_1_of_d_is_exact_and_the_other_parameters_are_those_of_the_changes() {
+        let u: Vec<f64> = (0..400_u32).map(|t| f64::from(t * t % 11) - 5.0).collect();
+        let e: Vec<f64> = (0..400_u32).map(|t| f64::from(t * t * 7 % 13) / 13.0 - 0.5).collect();
+        let (mut x, mut n, mut y) = (0.0, [0.0; 2], Vec::new());
+        for t in 0..u.len() {
+            if t > 0 {
+                x = 0.8 * x + 0.2 * u[t - 1];
+            }
+            let own = e[t] - if t > 0 { 0.5 * e[t - 1] } else { 0.0 } + 1.3 * n[0] - 0.3 * n[1];
+            n = [own, n[0]];
+            y.push(x + own);
+        }
+        let record = Record::new(&y, vec![&u]).unwrap();
+        let orders = Orders::bj(&[1], 1, 2, &[1], &[1]).unwrap();
+        let search = Search::default();
+        let monitor: Monitor<'_> = &|_| ControlFlow::Continue(());
+        let found = with_noise_integrator(&record, &orders, &["u".to_owned()], &search, monitor).unwrap();
+        let [b, c, d1, d2, f] = found.parameters() else { panic!("{:?}", found.parameters()) };
+        assert!((1.0 + d1 + d2).abs() < 1e-14);
+        assert!((b - 0.2).abs() < 0.02 && (f + 0.8).abs() < 0.02, "{b} {f}");
+        // d_2 = -d', and d_1 = d' - 1 has the same error; those of the others are their own.
+        let covariance = found.covariance().unwrap();
+        assert_eq!((covariance[2][2], covariance[2][3]), (covariance[3][3], -covariance[3][3]));
+        assert_eq!(covariance[1][3], -covariance[1][2]);
+        assert!(c.is_finite() && matches!(found.procedure(), Procedure::PredictionError(_)));
+        assert_eq!(found.initial(), Initial::Estimate);
+    }
+}

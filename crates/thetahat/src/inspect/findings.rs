@@ -96,7 +96,12 @@ fn of_channel(channel: &ChannelQuality, rows: usize) -> Vec<Finding> {
             plural(channel.outlier_count),
             listed.join(", ")
         );
-        let advice = "where they are wrong, empty their fields, or fit with `norm` 1";
+        let advice = match channel.role.as_deref() {
+            Some("output") => {
+                "a fit without orders takes them for missing; where they are wrong, empty their fields, or fit with `norm` 1"
+            }
+            _ => "where they are wrong, empty their fields, or fit with `norm` 1",
+        };
         findings.push(say(FindingKind::Outliers, seen, advice).at(single(&channel.outliers)));
     }
     if let Some(stuck) = channel.stuck {

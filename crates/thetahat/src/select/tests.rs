@@ -58,6 +58,7 @@ fn chosen(
         select,
         focus: Focus::Auto,
         initial,
+        may_drift: true,
         search: &search,
         deadline: Deadline::default(),
         monitor: &|_| ControlFlow::Continue(()),
@@ -66,6 +67,7 @@ fn chosen(
 }
 
 /// A choice by MDL for some purpose.
+/// Without a look for drifts.
 fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<SelectedModel, Error> {
     let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
     let search = Search::default();
@@ -76,6 +78,7 @@ fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<Selecte
         select: Select::MDL,
         focus,
         initial: Initial::Auto,
+        may_drift: false,
         search: &search,
         deadline: Deadline::default(),
         monitor: &|_| ControlFlow::Continue(()),

@@ -488,6 +488,8 @@ fn an_estimated_start_is_the_best_there_is_for_a_free_run() {
                 effect[t] -= earlier(&model.a, effect, t);
             }
         }
+        // The level of a noise that integrates.
+        effects.extend(model.noise_integrates().then(|| vec![1.0; 200]));
         let cost = errors.iter().map(|e| e * e).sum::<f64>();
         let mut best = left(&from_rest, &effects);
         // With what earlier inputs do where that is worth it.

@@ -126,7 +126,39 @@ fn figures_of_blocks_are_those_of_single_fits() {
     assert!((seen.percent() - 100.0 * (1.0 - seen.blocks.sqrt())).abs() < 1e-12);
 }
 
-/// A static curve in front of the plant and a drift: outside of the model set.
+/// A noise that wanders, which a slow pole of the plant would follow: free runs have levels of their own, and the noise integrates.
+#[test]
+fn a_slow_pole_is_not_rewarded_for_a_drift() {
+    let mut noise = Noise(18);
+    let (mut u, e) = (vec![0.0; 1500], noise.take(1500));
+    for t in 1..1500 {
+        u[t] = if t % 12 == 0 { 2.0 * noise.uniform() } else { u[t - 1] };
+    }
+    let x = filtered(&[0.0, 0.2], &[1.0, -0.9], &u);
+    let choice = Choice::Automatic(Automatic::default());
+    let of = |drift: f64| {
+        let wandering: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + 0.1 * e).collect();
+        let y = sum(&wandering, &filtered(&[0.0, 1.0], &[1.0, -1.0], &e), drift);
+        choose_orders(&Record::new(&y, vec![&u]).unwrap(), None, &choice, Select::MDL).unwrap()
+    };
+    let still = of(0.0);
+    assert_eq!((still.level_window, still.noise_integrates), (None, false));
+    let wandering = of(0.05);
+    // Four time constants of 9.5 samples are shorter than the shortest window.
+    assert_eq!(
+        (wandering.level_window, wandering.noise_integrates),
+        (Some(64), true),
+        "{:?}",
+        wandering.steps
+    );
+    assert!(
+        wandering.chosen.orders.nd > 0 && wandering.chosen.orders.nf[0] <= 2,
+        "{}",
+        wandering.chosen.orders
+    );
+}
+
+/// A static curve in front of the plant and a drift, of which nothing is to be known: outside of the model set.
 #[test]
 fn what_simulates_is_taken_where_the_plant_is_not_among_the_models() {
     let mut noise = Noise(17);
@@ -197,6 +229,7 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
             select,
             focus,
             initial: Initial::Auto,
+            may_drift: false,
             search: &search,
             deadline: Deadline::default(),
             monitor: &|_| ControlFlow::Continue(()),

@@ -154,6 +154,7 @@ fn whoever_watches_can_end_it() {
         select: Select::MDL,
         focus: Focus::Prediction,
         initial: Initial::Auto,
+        may_drift: true,
         search: &Search::default(),
         deadline: Deadline::default(),
         monitor,

@@ -1,7 +1,7 @@
 //! What a fit of a process found, as a table for people.
 
 use thetahat::estimate::Procedure;
-use thetahat::figures::{error, number, of_unit, seconds};
+use thetahat::figures::{error, number, seconds, unit_of};
 use thetahat::model::ProcessModel;
 use thetahat::report::Report;
 use thetahat::text::harmless;
@@ -37,8 +37,8 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
     for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
         parameters.row([
             parameter.name.clone(),
-            of_unit(parameter.value, unit),
-            unit.to_owned(),
+            number(parameter.value),
+            unit_of(parameter.value, unit),
             or_dash(parameter.standard_error, error),
             or_dash(*white, error),
         ]);

@@ -157,6 +157,17 @@ pub fn of_unit(value: f64, unit: &str) -> String {
     if unit == "s" { with_spoken(number(value), value) } else { number(value) }
 }
 
+/// A unit in a column of units; of seconds with [`spoken_time`] too.
+///
+/// ```
+/// use thetahat_numerics::figures::unit_of;
+///
+/// assert_eq!([unit_of(136.0, "s"), unit_of(136.0, "y/u")], ["s (2.27 min)", "y/u"]);
+/// ```
+pub fn unit_of(value: f64, unit: &str) -> String {
+    if unit == "s" { with_spoken(unit.to_owned(), value) } else { unit.to_owned() }
+}
+
 /// A time in a sentence.
 ///
 /// ```

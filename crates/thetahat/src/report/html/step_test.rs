@@ -6,7 +6,7 @@ use super::page::{Page, Section, Table};
 use super::text::{or_dash, quantity};
 use super::{of, tables};
 use crate::data::Log;
-use crate::figures::{of_unit, short, three};
+use crate::figures::{number, of_unit, short, three, unit_of};
 use crate::model::LinearModel;
 use crate::step_test::{FittedProcess, StepSummary, StepTest};
 
@@ -86,8 +86,8 @@ fn parameters(process: &FittedProcess) -> Table {
     for parameter in &process.parameters {
         table.row([
             parameter.name.clone(),
-            of_unit(parameter.value, process.structure.unit(&parameter.name)),
-            process.structure.unit(&parameter.name).to_owned(),
+            number(parameter.value),
+            unit_of(parameter.value, process.structure.unit(&parameter.name)),
             or_dash(parameter.standard_error, three),
         ]);
     }

@@ -14,7 +14,7 @@ use crate::data::{Rows, Source};
 use crate::estimate::{
     Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome, VectorArxOutcome,
 };
-use crate::figures::{chance, fixed, number, of_unit, scientific, seconds, short, three};
+use crate::figures::{chance, fixed, number, scientific, seconds, short, three, unit_of};
 use crate::model::{
     ContinuousStateSpaceModel, EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel,
     ProcessModel, Quantity, Root, Signal, StateSpaceModel,
@@ -245,8 +245,8 @@ pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table
     for ((parameter, white), unit) in model.parameters.iter().zip(&outcome.white_standard_errors).zip(units) {
         table.row([
             parameter.name.clone(),
-            of_unit(parameter.value, unit),
-            unit.to_owned(),
+            number(parameter.value),
+            unit_of(parameter.value, unit),
             or_dash(parameter.standard_error, three),
             or_dash(*white, three),
         ]);

@@ -105,7 +105,7 @@ fn figures(text: &mut Text, found: &StepTest) {
         let mut cells = vec![
             if name == last { String::new() } else { name.clone() },
             format!("{}{trust}", of.method.title(of.figure)),
-            of_unit(value, unit),
+            number(value),
             or_dash(standard_error, error),
         ];
         if several {

@@ -162,6 +162,19 @@ fn a_plant_far_from_linear_gets_a_nonlinear_model() {
     let linear = folder.fit("log.csv --split 60/0/40 --narx none");
     assert_eq!(kinds(&linear), [""; 0]);
     assert_ne!(linear["model"]["kind"], "nonlinear-arx");
+    // A log that leaves the range is said to do so.
+    folder.done("fit log.csv --report tank.json");
+    folder.write(
+        "full.csv",
+        csv(&[
+            ("u", &u.iter().map(|u| u + 3.0).collect::<Vec<_>>()),
+            ("y", &y.iter().map(|y| y + 8.0).collect::<Vec<_>>()),
+        ]),
+    );
+    let outside = "the model read values outside of those that it was fitted to";
+    let words = |log: &str| folder.done(&format!("validate tank.json {log} --format json")).stdout;
+    assert!(words("full.csv").contains(outside));
+    assert!(!words("log.csv").contains(outside));
     let free_run = |report: &Value| {
         let fits = report["fit"].as_array().into_iter().flatten();
         let test = fits.filter(|fit| fit["part"] == "test" && fit["horizon"]["kind"] == "free-run");

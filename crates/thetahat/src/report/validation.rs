@@ -30,6 +30,8 @@ const AS_MANY: f64 = 0.05;
 /// from zero as the second number says.
 const OFF_CENTER: f64 = 0.3;
 const CERTAIN: f64 = 4.0;
+/// This share of the samples may lie outside of what a nonlinear model was fitted to.
+const FEW: f64 = 0.05;
 /// So many samples stand for each lag of the test of all outputs together.
 const PORTMANTEAU: usize = 10;
 /// Lags that tests may be asked for.
@@ -377,7 +379,23 @@ fn evaluate(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validati
             Horizon::FreeRun => evaluated.free_run = Some(responses),
         }
     }
+    validation.warnings.extend(unknown_range(&validation.fit));
     evaluated
+}
+
+/// A warning where a nonlinear model read values outside of those that it was fitted to, for more than a few samples: it knows nothing of them.
+fn unknown_range(fits: &[Fit]) -> Option<String> {
+    let shares = fits.iter().filter_map(|fit| Some((fit.outside?, fit)));
+    let (share, fit) = shares.max_by(|(one, _), (other, _)| one.total_cmp(other))?;
+    (share > FEW).then(|| {
+        format!(
+            "for {} % of the samples of '{}', {}, the model read values outside of those that it was fitted to, of which it knows nothing: fit it to \
+             a log that covers them",
+            fixed(100.0 * share, 0),
+            fit.output,
+            fit.horizon
+        )
+    })
 }
 
 /// How often an output lies in the intervals around predictions this many steps ahead, as wide as their deviations say.

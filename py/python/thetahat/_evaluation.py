@@ -211,7 +211,7 @@ class Finding:
     >>> found.kind, found.channels, found.rows
     ('outliers', ['y'], [(121, 121)])
     >>> print(found)
-    channel 'y' has values far from their neighbours at row 121: where they are wrong, empty their fields, or fit with norm 1
+    channel 'y' has values far from their neighbours at row 121: a fit without orders takes them for missing; where they are wrong, empty their fields, or fit with norm 1
     """
 
     kind: str

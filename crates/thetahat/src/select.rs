@@ -39,6 +39,7 @@ mod held_out;
 mod held_out_mse;
 mod linear;
 mod processes;
+mod prose;
 mod ranking;
 mod rival;
 mod search;

@@ -22,7 +22,7 @@ use thetahat_numerics::regression::LaggedMoments;
 
 use super::candidates::{MOST_INPUTS, SAMPLES, Samples, are_enough, rows};
 use super::linear::{Columns, Fitted, Rows, Scaled};
-use super::ranking::number;
+use super::prose::number;
 use super::{Delay, DelayScore, Task};
 use crate::Error;
 use crate::data::Record;

@@ -4,12 +4,11 @@ use std::cmp::Ordering;
 
 use super::candidates::{Compared, total};
 use super::compare::Outcome;
-use super::winners::{Winners, winners};
-use super::{Best, Candidate, Focus, Path, Select, SelectedModel, Selection, Task};
+use super::prose::{both, described, models, named};
+use super::winners::winners;
+use super::{Best, Candidate, Path, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::estimate::{Method, estimate_of_channels};
-use crate::figures::{fixed, scientific};
-use crate::respond::Horizon;
 
 /// Models of a table.
 const BEST: usize = 50;
@@ -111,48 +110,6 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     Ok(SelectedModel { selection, decisions: Vec::new(), guess })
 }
 
-/// What both winners are, how they differ, and which was taken why.
-fn both(winners: &Winners, order: &[&Candidate], task: &Task<'_>) -> Vec<String> {
-    let Winners { prediction, simulation, chosen } = *winners;
-    let how = match task.focus.horizon() {
-        Horizon::FreeRun => "in free runs".to_owned(),
-        horizon => horizon.to_string(),
-    };
-    let percent = |k: usize| order[k].held_out.map(|seen| fixed(seen.percent(), 1));
-    let on_blocks = match percent(prediction) {
-        Some(percent) => format!("it fits {percent} % of blocks held out, {how}"),
-        None => "it was not evaluated without some of the rows, or these do not determine it".to_owned(),
-    };
-    let mut words =
-        vec![format!("For prediction: {}; {on_blocks}.", described(order[prediction], task.select))];
-    match percent(simulation) {
-        Some(_) if simulation == prediction => {
-            words.push(format!("No other model does better on held-out rows, {how}."));
-        }
-        Some(percent) => {
-            let orders = &order[simulation].orders;
-            words.push(format!("Best on held-out rows, {how}: {orders}, {percent} % on blocks."));
-        }
-        None => {}
-    }
-    words.push(match task.focus {
-        _ if chosen != prediction && chosen != simulation => {
-            "Taken: a model that is unstable however the rows are cut; none that is stable comes near it."
-                .to_owned()
-        }
-        Focus::Auto if chosen != prediction => "Taken: the second, as the difference is clear.".to_owned(),
-        Focus::Auto if simulation != prediction && order[prediction].held_out.is_none() => {
-            "Taken: the first, as the two cannot be compared; `focus` simulation takes the second.".to_owned()
-        }
-        Focus::Auto if simulation != prediction => {
-            "Taken: the first, as the difference is not clear; `focus` simulation takes the second."
-                .to_owned()
-        }
-        _ => return words,
-    });
-    words
-}
-
 /// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.
 fn better(a: &Candidate, b: &Candidate, by_held_out_mse: bool) -> Ordering {
     let score = |model: &Candidate| {
@@ -167,34 +124,4 @@ fn better(a: &Candidate, b: &Candidate, by_held_out_mse: bool) -> Ordering {
 
 fn is_exact(model: &Candidate, by_held_out_mse: bool) -> bool {
     if by_held_out_mse { model.held_out_mse == Some(0.0) } else { model.mse == 0.0 }
-}
-
-pub(super) fn models(count: usize) -> String {
-    if count == 1 { "1 model".to_owned() } else { format!("{count} models") }
-}
-
-fn named(select: Select) -> &'static str {
-    match select {
-        Select::Criterion(criterion) => criterion.name(),
-        Select::Validation => "the mean of e^2 on the validation rows",
-        Select::Cv => "cross-validation",
-    }
-}
-
-/// A model with its score.
-fn described(model: &Candidate, select: Select) -> String {
-    let score = match model.score {
-        Some(score) => number(score),
-        None => "not defined: the model is exact".to_owned(),
-    };
-    let name = match select {
-        Select::Validation | Select::Cv => "mean of e^2",
-        _ => named(select),
-    };
-    format!("{} ({name} {score})", model.orders)
-}
-
-/// Five digits or more.
-pub(super) fn number(value: f64) -> String {
-    if (0.01..1e5).contains(&value.abs()) { fixed(value, 4) } else { scientific(value, 4) }
 }

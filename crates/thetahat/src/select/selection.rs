@@ -177,8 +177,9 @@ impl HeldOut {
         f64::midpoint(logarithm(self.blocks), logarithm(self.onward))
     }
 
-    /// 100 (1 - |e|/|y - mean(y)|) on all blocks.
+    /// The fit that decides: 100 (1 - |e|/|y - mean(y)|), where the square of the ratio is the geometric mean of that on all blocks and that
+    /// onward.
     pub fn percent(&self) -> f64 {
-        100.0 * (1.0 - self.blocks.sqrt())
+        100.0 * (1.0 - (0.5 * self.both()).exp())
     }
 }

@@ -238,3 +238,16 @@ fn values_far_from_their_neighbours_are_taken_for_missing() {
     assert_eq!(kinds(&all), [""; 0]);
     assert!(number(&all, "/estimation/mse") > 20.0 * number(&report, "/estimation/mse"));
 }
+
+#[test]
+fn the_answer_to_a_single_blow_is_no_outlier() {
+    let mut random = Random::new(29);
+    let mut u = vec![0.0; 300];
+    u[60] = 1.0;
+    let y: Vec<f64> =
+        (0..300).map(|row| if row == 61 { 5.0 } else { 0.0 } + 0.02 * random.uniform()).collect();
+    let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
+    assert!(!kinds(&folder.fit("log.csv")).contains(&"outliers"));
+    let seen = folder.done("inspect log.csv --format json").stdout;
+    assert!(!seen.contains("far from their neighbours") && !seen.contains("far from its"), "{seen}");
+}

@@ -11,6 +11,8 @@ use crate::data::{Channel, Log, Rows, Times};
 const ANSWERS: usize = 10;
 /// And that so many lie so near has at most this probability where there is nothing in it.
 const CHANCE: f64 = 0.01;
+/// Of jumps near which no more than this part of all rows lies, each outlier near one is an answer, whatever chance says: a single blow.
+const SELDOM: f64 = 0.2;
 /// A jump is this part of the largest change, and so many times what nine of ten changes are.
 const LARGE: f64 = 0.5;
 const RARE: f64 = 10.0;
@@ -38,7 +40,7 @@ pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usiz
 }
 
 /// The outliers (rows from 1) that other channels do not explain, by the rows (0-based, sorted) at which these jump: all, but for those near
-/// jumps where more lie there than chance brings once in a hundred times.
+/// jumps where jumps are seldom, or more lie there than chance brings once in a hundred times.
 fn unexplained(all: &[usize], jumps: &[usize], rows: usize) -> Vec<usize> {
     let near = |row: usize| {
         let next = jumps.partition_point(|jump| jump + ANSWERS < row);
@@ -47,7 +49,8 @@ fn unexplained(all: &[usize], jumps: &[usize], rows: usize) -> Vec<usize> {
     let covered = (0..rows).filter(|row| near(*row)).count() as f64 / rows as f64;
     let explained = all.iter().filter(|row| near(**row - 1)).count() as u64;
     let by_chance = Binomial::new(covered, all.len() as u64);
-    if explained == 0 || by_chance.map_or(1.0, |chance| chance.sf(explained - 1)) > CHANCE {
+    let may_be_chance = || by_chance.map_or(1.0, |chance| chance.sf(explained - 1)) > CHANCE;
+    if explained == 0 || covered > SELDOM && may_be_chance() {
         return all.to_vec();
     }
     all.iter().copied().filter(|row| !near(row - 1)).collect()

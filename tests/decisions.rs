@@ -212,8 +212,10 @@ fn a_level_that_wanders_is_noise_that_integrates() {
     let percent =
         runs.filter(|fit| fit["horizon"]["kind"] == "free-run").filter_map(|fit| fit["percent"].as_f64());
     assert!(percent.clone().count() == 1 && percent.min_by(f64::total_cmp) > Some(97.0), "{}", free["fit"]);
-    // Whoever asks for a structure has it.
-    assert_eq!(kinds(&folder.fit("log.csv --model oe")), [""; 0]);
+    // Whoever asks for a structure has it, or for free runs.
+    for option in ["--model oe", "--focus simulation"] {
+        assert_eq!(kinds(&folder.fit(&format!("log.csv {option}"))), [""; 0], "{option}");
+    }
 }
 
 #[test]

@@ -523,7 +523,7 @@ fn drift(output: &str, orders: &Orders) -> Decision {
         did: format!(
             "the noise of {orders} integrates (D has the root 1), free runs have a level of their own in each window, and no offset is known"
         ),
-        instead: "`model` oe".to_owned(),
+        instead: "`model` oe or `focus` simulation".to_owned(),
     }
 }
 

@@ -25,8 +25,8 @@ use crate::model::PolynomialModel;
 /// ```
 ///
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
-/// can do. Where the noise integrates, D(1) = 0, a constant is among them: its level before the segment is not known. n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are
-/// taken to be zero, unless estimating them is worth its parameters by the rule of
+/// can do. Where the noise integrates, D(1) = 0, a constant is among them: its level before the segment is not known.
+/// n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are taken to be zero, unless estimating them is worth its parameters by the rule of
 /// [`Initial::Auto`](crate::estimate::Initial::Auto). Segments too short for a start are left out.
 ///
 /// But for [`InitialCondition::Drop`], the run goes on where an output is missing (see

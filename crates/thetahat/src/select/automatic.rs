@@ -62,8 +62,10 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     let follows = loops.certain();
     let closed = automatic.structure.is_none() && task.focus == Focus::Auto && follows.contains(&true);
     let task = &if closed { Task { focus: Focus::Prediction, ..*task } } else { *task };
-    // Whoever asks for a structure without a model of the noise has it.
-    let may_drift = task.may_drift && matches!(automatic.structure, None | Some(Structure::Bj));
+    // Whoever asks for a structure without a model of the noise, or for free runs, has it.
+    let may_drift = task.may_drift
+        && matches!(automatic.structure, None | Some(Structure::Bj))
+        && matches!(task.focus, Focus::Auto | Focus::Prediction);
     let task = &Task { may_drift, ..*task };
     let structures = structures(task, automatic, closed)?;
     let driven = structures.iter().any(|structure| !matches!(structure, Structure::Ar | Structure::Arma));

@@ -52,6 +52,8 @@ pub(super) struct Drift {
     pub(super) integrates: bool,
 }
 
+/// What drifts, by the noise of the model with the least criterion; none where nothing does. Two searches.
+///
 /// # Errors
 /// [`Error::Interrupted`].
 pub(super) fn drift(task: &Task<'_>, record: &Record<'_>, model: &Trial) -> Result<Option<Drift>, Error> {

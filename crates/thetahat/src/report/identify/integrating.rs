@@ -40,7 +40,8 @@ impl<'l> Integrating<'l> {
         open.then_some(Self { log, plan: own })
     }
 
-    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, or far closer than one whose noise integrates, and why it is taken; none of other models,
+    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, or far closer than one whose noise
+    /// integrates, and why it is taken; none of other models,
     /// and where no process comes as close.
     ///
     /// # Errors

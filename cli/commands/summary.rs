@@ -66,14 +66,24 @@ pub(crate) fn converted(report: &Report, width: usize) -> String {
 
 /// The report's main figures, this many columns wide.
 pub fn table(report: &Report, width: usize) -> String {
-    let model = match &report.model {
-        Model::Polynomial(model) => model,
-        Model::Equations(model) => return equations::table(report, model, width),
-        Model::NonlinearArx(model) => return nonlinear_arx::table(report, model, width),
-        Model::Process(model) => return process::table(report, model, width),
-        Model::StateSpace(model) => return state_space::table(report, model, width),
-        Model::ContinuousStateSpace(model) => return continuous::table(report, model, width),
+    let mut shown = match &report.model {
+        Model::Polynomial(model) => polynomial(report, model, width),
+        Model::Equations(model) => equations::table(report, model, width),
+        Model::NonlinearArx(model) => nonlinear_arx::table(report, model, width),
+        Model::Process(model) => process::table(report, model, width),
+        Model::StateSpace(model) => state_space::table(report, model, width),
+        Model::ContinuousStateSpace(model) => continuous::table(report, model, width),
     };
+    if !report.purpose.is_empty() {
+        let mut text = Text::new(width);
+        text.line("");
+        text.line(&report.purpose);
+        shown.push_str(&text.finish());
+    }
+    shown
+}
+
+fn polynomial(report: &Report, model: &PolynomialModel, width: usize) -> String {
     let mut text = Text::new(width);
     selection::selection(&mut text, report);
     text.line(&format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));

@@ -25,7 +25,7 @@ pub use filter::{add_filtered, divide, divide_from, divide_together};
 pub use forward::{Chosen as ChosenTerm, Path, forward};
 pub use gram::{Interior, Products, gram, joint_gram};
 pub use kernel::{
-    differences, extended_product, extended_sum, largest, product, squares_above, sum, sum_above,
+    add_scaled, differences, extended_product, extended_sum, largest, product, squares_above, sum, sum_above,
     sum_of_squares,
 };
 pub use lagged::{Lagged, Presample, Taps};

@@ -52,6 +52,7 @@ mod normal_equations;
 mod pending;
 mod plan;
 mod process;
+mod purpose;
 mod reduce;
 mod requirement;
 mod row;

@@ -130,7 +130,7 @@ fn four_products(x: &[f64], y: &[f64]) -> [f64; SHIFTS] {
 
 /// `target += weight x`, both as long. 2 flops a sample.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
-pub(super) fn add_scaled(target: &mut [f64], weight: f64, x: &[f64]) {
+pub fn add_scaled(target: &mut [f64], weight: f64, x: &[f64]) {
     for (target, x) in target.iter_mut().zip(x) {
         *target += weight * x;
     }

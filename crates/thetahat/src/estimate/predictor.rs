@@ -448,8 +448,9 @@ impl<'a> Predictor<'a> {
             let layout = &layouts[section.layout];
             if layout.faded {
                 section.project(layout, polynomials, negative);
+            } else {
+                section.evaluate(layout, polynomials, negative);
             }
-            section.evaluate(layout, polynomials, negative);
         };
         if self.sections.len() > 1 && self.samples >= PARALLEL_FROM {
             self.sections.par_iter_mut().for_each(each);

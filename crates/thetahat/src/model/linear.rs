@@ -1,4 +1,5 @@
 use super::fitted::{PolynomialModel, Signal};
+use super::quantity::Quantity;
 use super::state_space::{ContinuousStateSpaceModel, StateSpaceModel};
 
 /// What a linear model is from its inputs to one of its outputs.
@@ -52,6 +53,17 @@ impl LinearModel<'_> {
             Self::Transfer(model) => model.stable,
             Self::StateSpace(model, _) => model.stable,
             Self::Continuous(model, _) => model.stable,
+        }
+    }
+
+    /// The static gain of an input, counted from 0; none where a pole of it stands at an integrator's place.
+    pub fn dc_gain(&self, input: usize) -> Option<Quantity> {
+        let of = |gains: &[Option<Quantity>]| gains.get(input).copied().flatten();
+        match self {
+            Self::Polynomial(model) => of(&model.dc_gain),
+            Self::Transfer(model) => of(&model.dc_gain),
+            Self::StateSpace(model, output) => model.dc_gain.get(*output).and_then(|gains| of(gains)),
+            Self::Continuous(model, output) => model.dc_gain.get(*output).and_then(|gains| of(gains)),
         }
     }
 

@@ -47,7 +47,8 @@ impl Report {
             TimeBase::Sampled(seconds) => self.model.at_sample_time(seconds, Some(hold))?.into(),
         };
         let free = model.free_parameters();
-        let mut report = Self { model, fit: Vec::new(), selection: None, ..self.clone() };
+        let mut report =
+            Self { model, fit: Vec::new(), purpose: String::new(), selection: None, ..self.clone() };
         // They were those of another model.
         report.estimation.criteria = Criteria::new(f64::NAN, free, report.estimation.samples);
         let from = match &self.model {

@@ -261,6 +261,7 @@ fn fit(
         model: Model::Equations(fitted.clone()),
         estimation,
         fit: Vec::new(),
+        purpose: String::new(),
         warnings: words,
     };
     evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
@@ -268,7 +269,7 @@ fn fit(
         let on_log = EquationsOnLog::new(&fitted, log, &rows, &report.data.estimation)?;
         evaluate(&mut report, &on_log, part, Focus::Auto);
     }
-    Ok(report)
+    Ok(report.with_purpose())
 }
 
 /// How large the innovations of a fit are.

@@ -37,13 +37,14 @@ pub(super) fn report_of(
         decisions: Vec::new(),
         estimation: estimation_of(fitted, taken),
         fit: Vec::new(),
+        purpose: String::new(),
         warnings: Vec::new(),
         model: model.clone().into(),
     };
     report.warnings = warnings(&report, &model);
     let (start, errors) = (estimation_start(&report, &model), (estimate.samples(), estimate.mse()));
     report.fit.push(one_step(&model.output.name, &report.data.estimation, errors, spread, start));
-    Ok(report)
+    Ok(report.with_purpose())
 }
 
 /// The figures one step ahead of an output with this norm about its mean, of errors with this mean square.

@@ -57,6 +57,7 @@ pub fn fit_page(
     let title = format!("Fit of {}{}", names.join(", "), of(&report.data.logs));
     let mut page = Page::new(title, command, &report.generator);
     page.lead = lead(model, &report.fit);
+    page.lead.extend(Some(report.purpose.clone()).filter(|purpose| !purpose.is_empty()));
     page.warnings = &report.warnings;
     let parts: Vec<(String, &Validated)> =
         validated.iter().map(|validated| (part_name(report, &validated.validation), validated)).collect();

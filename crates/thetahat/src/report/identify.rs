@@ -305,6 +305,7 @@ fn fit(
         decisions,
         estimation: estimation_of(&fitted, output.offset),
         fit: Vec::new(),
+        purpose: String::new(),
         warnings: Vec::new(),
         model: model.clone().into(),
     };

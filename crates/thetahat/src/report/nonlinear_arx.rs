@@ -82,7 +82,7 @@ pub(super) fn fit_planned(
         evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
     report.warnings.extend(warnings(&report, &model));
-    Ok(report)
+    Ok(report.with_purpose())
 }
 
 /// A report without figures and warnings, and its model.
@@ -117,6 +117,7 @@ pub(super) fn reported(
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
+        purpose: String::new(),
         warnings: Vec::new(),
     };
     Reported { report, model }

@@ -64,7 +64,7 @@ impl PendingEvaluation {
 
     /// The figures are there.
     pub(super) fn done(report: Report) -> Self {
-        Self { report, open: None }
+        Self { report: report.with_purpose(), open: None }
     }
 
     /// The report so far: without figures of how well the model fits, and what they give reason to warn of.
@@ -112,7 +112,7 @@ impl PendingEvaluation {
                 }
             }
         }
-        Ok(report)
+        Ok(report.with_purpose())
     }
 }
 

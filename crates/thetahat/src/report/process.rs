@@ -291,6 +291,7 @@ pub fn fit_process(
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
+        purpose: String::new(),
     };
     if log.check_uniform().is_ok()
         && let Ok(record) = deviations.record(&plan.inputs, &plan.output, &report.data.estimation)
@@ -305,7 +306,7 @@ pub fn fit_process(
     for (part, rows) in report.data.held_out() {
         evaluate(&mut report, &on_log(&rows)?, part, Focus::Auto);
     }
-    Ok(report)
+    Ok(report.with_purpose())
 }
 
 /// The model of what was found.

@@ -58,7 +58,13 @@ impl Report {
         };
         let free = order * (m + 2 * l) + direct;
         let model = StateSpaceModel::new((inputs, outputs), vec![0; m], &found.model, free, degrees)?;
-        let mut report = Self { model: model.into(), fit: Vec::new(), selection: None, ..self.clone() };
+        let mut report = Self {
+            model: model.into(),
+            fit: Vec::new(),
+            purpose: String::new(),
+            selection: None,
+            ..self.clone()
+        };
         // They were those of another model.
         report.estimation.criteria = Criteria::new(f64::NAN, free, report.estimation.samples);
         report.warnings = vec![format!(

@@ -34,6 +34,9 @@ pub struct Report {
     pub estimation: Estimation,
     /// How well it fits, one entry for each part of the log and horizon.
     pub fit: Vec<Fit>,
+    /// What the model is good for, in one sentence; empty where nothing was evaluated.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub purpose: String,
     /// What a careful reader should know, in plain words.
     pub warnings: Vec<String>,
 }

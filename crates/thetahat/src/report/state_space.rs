@@ -365,6 +365,7 @@ pub(super) fn reported(
         model: Model::from(model.clone()),
         estimation,
         fit: Vec::new(),
+        purpose: String::new(),
     };
     Ok((report, model))
 }

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use super::candidates::{MOST_INPUTS, Samples, are_enough, energy, rows, total};
-use super::compare::{LONG, SEGMENT, SEGMENTS, compare};
+use super::compare::{LONG, SEGMENT, SEGMENTS, compare, keep_quick};
 use super::delay;
 use super::grid::key;
 use super::linear::{Columns, Fitted, Scaled};
@@ -93,20 +93,27 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
         let names: Vec<&str> = idle.iter().map(|&input| task.inputs[input].as_str()).collect();
         steps.push(format!("Models without {} compete, as no effect is seen.", names.join(", ")));
     }
+    // What may simulate best is fitted, whatever its MDL.
+    let mut essential: Vec<Orders> = Vec::new();
     if task.looks_further() && automatic.nk.is_none() {
         let least = usize::from(follows.contains(&true));
         for delay in (least..=1).rev() {
-            models.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
+            essential.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
         }
     }
     if task.looks_further() {
-        models.extend(diagonal(task.estimation, &structures, &nk)?);
+        essential.extend(diagonal(task.estimation, &structures, &nk)?);
+        essential.extend(models.iter().filter(|orders| orders.nc + orders.nd == 0).cloned());
     }
+    models.extend(essential.iter().cloned());
+    let essential: BTreeSet<Vec<usize>> =
+        essential.iter().map(|orders| key(&task.with_constants(orders))).collect();
     let mut seen = BTreeSet::new();
     models.retain(|orders| seen.insert(key(orders)));
+    steps.extend(keep_quick(task, &mut models));
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
-    let outcome = compare(task, models)?;
+    let outcome = compare(task, models, Some(&essential))?;
     let SelectedModel { mut selection, guess, .. } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);

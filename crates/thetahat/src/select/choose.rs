@@ -102,11 +102,11 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<SelectedModel, 
     let task = &Task { focus, may_drift, ..*task };
     match choice {
         Choice::Known(orders) => {
-            let outcome = compare::compare(task, vec![orders.clone()])?;
+            let outcome = compare::compare(task, vec![orders.clone()], None)?;
             ranking::ranked(task, outcome, Some(Path::All))
         }
         Choice::Grid(grid) => {
-            let outcome = compare::compare(task, grid.orders(inputs)?)?;
+            let outcome = compare::compare(task, grid.orders(inputs)?, None)?;
             ranking::ranked(task, outcome, Some(grid.path))
         }
         Choice::Automatic(automatic) => automatic::choose(task, automatic),

@@ -1,5 +1,7 @@
 //! All models on the same samples.
 
+use std::collections::BTreeSet;
+
 use super::candidates::{Compared, Samples, Trial, energy, rows, total};
 use super::drift::{self, Drift};
 use super::linear::{Columns, Fitted, Scaled};
@@ -14,6 +16,12 @@ use crate::model::Orders;
 pub(super) const LONG: usize = 1 << 16;
 pub(super) const SEGMENTS: usize = 16;
 pub(super) const SEGMENT: usize = 1 << 11;
+/// A step of a search takes N p^2 multiplications, and the searches of a choice many steps: models that take more are left out, and records of
+/// which models with [`USUAL`] coefficients for each input, and as many for the noise, take more are thinned, to segments of so many samples
+/// at least.
+const MOST_OPERATIONS: f64 = 1e7;
+const USUAL: usize = 4;
+const SHORTEST: usize = 1 << 8;
 /// Of records with more samples, blocks are held out of segments only: few, so that free runs are long.
 const MOST_IN_BLOCKS: usize = 1 << 14;
 const SEGMENTS_OF_BLOCKS: usize = 4;
@@ -22,6 +30,8 @@ pub(super) struct Outcome {
     /// Those that the data determine.
     pub(super) models: Vec<Compared>,
     pub(super) failed: usize,
+    /// Those that were not fitted, as larger ones show that they cannot have the least MDL.
+    pub(super) hopeless: usize,
     /// The smallest model of all.
     pub(super) smallest: Option<Orders>,
     /// N.
@@ -32,16 +42,21 @@ pub(super) struct Outcome {
     pub(super) drift: Option<Drift>,
 }
 
-/// Fits all models to the same samples. Each model is there once.
+/// Fits all models to the same samples. Each model is there once. With `essential` ones, by what tells them apart (see `key`), others that
+/// cannot have the least MDL are not fitted.
 ///
 /// # Errors
 /// As for [`choose`](super::choose).
-pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, Error> {
+pub(super) fn compare(
+    task: &Task<'_>,
+    models: Vec<Orders>,
+    essential: Option<&BTreeSet<Vec<usize>>>,
+) -> Result<Outcome, Error> {
     let mut remarks = Vec::new();
     let models: Vec<Orders> = models.iter().map(|orders| task.with_constants(orders)).collect();
     let searched = models.iter().any(|orders| !orders.is_linear());
     let all = total(task.estimation);
-    let thin = if searched && all > LONG { stretches(task.estimation, SEGMENTS, SEGMENT) } else { None };
+    let thin = if searched { thinned(task, essential.is_some()) } else { None };
     if let Some(thin) = &thin {
         remarks.push(format!(
             "To save time, compared on {} of {all} samples, in {} segments spread over the log.",
@@ -69,15 +84,17 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
     // Those of linear models are zero already where they are rounding.
     let nothing = if searched { EXACT * energy(record) } else { 0.0 };
     let exact = |cost: f64| if cost <= nothing { 0.0 } else { cost };
+    let mut hopeless = 0;
     if searched {
         let free = task.initial != Initial::Zero;
         let common = Common::new(record, free, samples.window, task.search, task.deadline, task.monitor)?;
-        let score = |orders: &Orders, point: &Point| {
-            let (size, mse) = (point.parameters.len(), exact(point.cost) / count as f64);
-            let score = score(Select::MDL, mse, size, price(orders, point.initial), count, None);
+        let score = |orders: &Orders, cost: f64, initial: f64| {
+            let (size, mse) = (orders.parameters(), exact(cost) / count as f64);
+            let score = score(Select::MDL, mse, size, price(orders, initial), count, None);
             score.unwrap_or(f64::NEG_INFINITY)
         };
-        Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score)?;
+        let essential = essential.filter(|_| task.select == Select::MDL).zip(Some(count));
+        hopeless = Family::new(&tried, task.inputs.len()).fit(&common, &mut tried, &score, essential)?;
     }
     let costs = held_out_mse::costs(task, record, &tried)?;
     let scores: Vec<Option<f64>> = tried
@@ -138,7 +155,36 @@ pub(super) fn compare(task: &Task<'_>, models: Vec<Orders>) -> Result<Outcome, E
         },
     );
     let models: Vec<Compared> = models.collect();
-    Ok(Outcome { failed: total - models.len(), models, samples: count, smallest, remarks, drift })
+    Ok(Outcome {
+        failed: total - models.len() - hopeless,
+        hopeless,
+        models,
+        samples: count,
+        smallest,
+        remarks,
+        drift,
+    })
+}
+
+/// Segments of a long record: models of which some need a search see no more of it. With `sparing` they are shorter for many inputs.
+fn thinned<'a>(task: &Task<'a>, sparing: bool) -> Option<Record<'a>> {
+    let usual = (USUAL * (task.inputs.len() + 1)) as f64;
+    let length = if sparing { (MOST_OPERATIONS / (usual * usual)) as usize / SEGMENTS } else { usize::MAX };
+    let length = length.max(SHORTEST);
+    let most = LONG.min(length.saturating_mul(SEGMENTS));
+    let is_long = total(task.estimation) > most;
+    if is_long { stretches(task.estimation, SEGMENTS, length.min(SEGMENT)) } else { None }
+}
+
+/// Leaves out the models whose searches take too long; and what there is to say of that.
+pub(super) fn keep_quick(task: &Task<'_>, models: &mut Vec<Orders>) -> Option<String> {
+    let samples = thinned(task, true).map_or_else(|| total(task.estimation), |thin| total(&thin)).max(1);
+    let most = (MOST_OPERATIONS / samples as f64).sqrt() as usize;
+    let all = models.len();
+    models.retain(|orders| orders.is_linear() || orders.parameters() <= most);
+    (models.len() < all).then(|| {
+        format!("To save time, models that need a search have at most {most} parameters: ranges of orders try larger ones.")
+    })
 }
 
 /// The part of a record that blocks are held out of: of a long one segments of all there is.

@@ -20,7 +20,7 @@ const CLOSE: f64 = 0.01;
 /// # Errors
 /// What a fit of the smallest model says, if the data determine none.
 pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> Result<SelectedModel, Error> {
-    let Outcome { models: compared, failed, samples, remarks, smallest, drift } = outcome;
+    let Outcome { models: compared, failed, hopeless, samples, remarks, smallest, drift } = outcome;
     let by_held_out_mse = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
     compared.sort_by(|a, b| better(&a.scored, &b.scored, by_held_out_mse));
@@ -67,6 +67,12 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     }
     let mut steps = remarks;
     steps.push(format!("Compared {} on {samples} common samples by {}.", models(count), named(task.select)));
+    if hopeless > 0 {
+        steps.push(format!(
+            "Not fitted: {} more, as larger ones with the same plant show that their MDL cannot be the least.",
+            models(hopeless)
+        ));
+    }
     if failed > 0 {
         steps.push(format!("The data could not determine {} more.", models(failed)));
     }
@@ -92,6 +98,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         samples,
         models: count,
         failed,
+        hopeless,
         delays: Vec::new(),
         chosen: chosen.clone(),
         second: second.copied().cloned(),

@@ -3,8 +3,12 @@
 //! A neighbour has one order less. Its parameters, and a zero, are parameters of the model with the same cost: so no model
 //! ends above a neighbour. (With two orders less, a pole and a zero that cancel would be added, and the gradient is
 //! zero there.) Models without such neighbours, and in the end the best ones, begin from the data as well.
+//!
+//! A choice by a criterion need not fit all of them (branch and bound: Land and Doig, An automatic method of solving discrete
+//! programming problems, Econometrica 28, 1960). Models with the same plant differ in C and D, and none of them has a lower cost than the
+//! largest of them. So the largest are fitted first, and their cost with the price of a smaller model's parameters bounds its criterion.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
@@ -21,12 +25,20 @@ const ROUNDS: usize = 3;
 /// A cost that is above a neighbour's by more than this fraction is one of a worse minimum.
 const SAME: f64 = 1e-7;
 
+/// A model whose criterion is above the least by this many units of 2 ln(likelihood) has e^-10 of its probability, and is not fitted.
+const HOPELESS: f64 = 20.0;
+
+/// The criterion of a model from its orders, its sum of squared errors and the price of its initial conditions.
+pub(super) type Score<'s> = dyn Fn(&Orders, f64, f64) -> f64 + Sync + 's;
+
 /// Models and their neighbours.
 pub(super) struct Family {
     /// The neighbours of each model.
     neighbours: Vec<Vec<usize>>,
     /// The models that need a search, by how many steps they are away from one without such neighbours.
     levels: Vec<Vec<usize>>,
+    /// For each model the largest with the same plant, if it is another one.
+    largest: Vec<Option<usize>>,
 }
 
 impl Family {
@@ -46,10 +58,27 @@ impl Family {
             levels.resize(levels.len().max(of[k] + 1), Vec::new());
             levels[of[k]].push(k);
         }
-        Self { neighbours, levels }
+        let plant = |k: usize| key(&Orders { nc: 0, nd: 0, ..models[k].orders.clone() });
+        let mut largest: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+        for k in (0..models.len()).filter(|&k| searched(k)) {
+            let Orders { nc, nd, .. } = models[k].orders;
+            let before = largest.entry(plant(k)).or_insert(k);
+            let other = &models[*before].orders;
+            if nc >= other.nc && nd >= other.nd {
+                *before = k;
+            }
+        }
+        let above = |k: usize| {
+            let of = largest.get(&plant(k)).copied().filter(|&of| of != k)?;
+            let (own, all) = (&models[k].orders, &models[of].orders);
+            (own.nc <= all.nc && own.nd <= all.nd).then_some(of)
+        };
+        let largest = (0..models.len()).map(above).collect();
+        Self { neighbours, levels, largest }
     }
 
-    /// Fits all models, from what is there of them and their neighbours. `score` says which are the best.
+    /// Fits the models, from what is there of them and their neighbours. `score` says which are the best. With `essential` ones only
+    /// these and those that may have the least score are fitted, to `samples`. Gives how many were not.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
@@ -57,24 +86,34 @@ impl Family {
         &self,
         common: &Common<'_>,
         tried: &mut [Trial],
-        score: &(dyn Fn(&Orders, &Point) -> f64 + Sync),
-    ) -> Result<(), Error> {
-        for (number, level) in self.levels.iter().enumerate() {
-            let fitted = level.par_iter().map(|&k| {
-                let starts = self.starts(k, tried);
-                common.fit(&tried[k].orders, &starts, number == 0 || starts.is_empty())
-            });
-            let fitted = fitted.collect::<Result<Vec<_>, Error>>()?;
-            level.iter().zip(fitted).for_each(|(&k, point)| tried[k].point = point);
+        score: &Score<'_>,
+        essential: Option<(&BTreeSet<Vec<usize>>, usize)>,
+    ) -> Result<usize, Error> {
+        let mut hopeless = 0;
+        let of = |tried: &[Trial], k: usize| {
+            let Trial { orders, point } = &tried[k];
+            point.as_ref().map_or(f64::INFINITY, |point| score(orders, point.cost, point.initial))
+        };
+        if essential.is_some() {
+            let first: BTreeSet<usize> = self.largest.iter().flatten().copied().collect();
+            self.ascend(common, tried, |_, k| first.contains(&k))?;
         }
+        self.ascend(common, tried, |tried, k| {
+            let Some((essential, samples)) = essential else { return true };
+            let Some(largest) = self.largest[k] else { return tried[k].point.is_none() };
+            let orders = &tried[k].orders;
+            let bound = tried[largest].point.as_ref().map(|point| score(orders, point.cost, point.initial));
+            let least = (0..tried.len()).map(|k| of(tried, k)).fold(f64::INFINITY, f64::min);
+            let fits = essential.contains(&key(orders))
+                || bound.is_none_or(|bound| bound - least <= HOPELESS / samples as f64);
+            hopeless += usize::from(!fits);
+            fits
+        })?;
         let mut begun = vec![false; tried.len()];
         self.levels.first().into_iter().flatten().for_each(|&k| begun[k] = true);
         for _ in 0..ROUNDS {
             let mut order: Vec<usize> = (0..tried.len()).collect();
-            let of = |k: usize| {
-                let Trial { orders, point } = &tried[k];
-                point.as_ref().map_or(f64::INFINITY, |point| score(orders, point))
-            };
+            let of = |k: usize| of(tried, k);
             order.sort_by(|&a, &b| of(a).total_cmp(&of(b)));
             order.truncate(BEST);
             order.retain(|&k| !begun[k] && !tried[k].orders.is_linear());
@@ -93,6 +132,25 @@ impl Family {
                 }
             }
             self.repair(common, tried)?;
+        }
+        Ok(hopeless)
+    }
+
+    /// Fits some of the models, the smaller first.
+    fn ascend(
+        &self,
+        common: &Common<'_>,
+        tried: &mut [Trial],
+        mut which: impl FnMut(&[Trial], usize) -> bool,
+    ) -> Result<(), Error> {
+        for (number, level) in self.levels.iter().enumerate() {
+            let level: Vec<usize> = level.iter().copied().filter(|&k| which(tried, k)).collect();
+            let fitted = level.par_iter().map(|&k| {
+                let starts = self.starts(k, tried);
+                common.fit(&tried[k].orders, &starts, number == 0 || starts.is_empty())
+            });
+            let fitted = fitted.collect::<Result<Vec<_>, Error>>()?;
+            level.iter().zip(fitted).for_each(|(&k, point)| tried[k].point = point);
         }
         Ok(())
     }

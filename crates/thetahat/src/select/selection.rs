@@ -8,6 +8,11 @@ use crate::model::{Orders, ProcessStructure, Structure};
 /// Mean squares below this are rounding.
 const NOTHING: f64 = 1e-12;
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
 /// The logarithm of a mean square.
 pub(super) fn logarithm(square: f64) -> f64 {
     square.max(NOTHING).ln()
@@ -31,6 +36,9 @@ pub struct Selection {
     pub models: usize,
     /// How many more the data could not determine.
     pub failed: usize,
+    /// How many more were not fitted, as larger models with the same plant show that their MDL cannot be the least.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub hopeless: usize,
     /// The delay of each input, where it was left to the data.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delays: Vec<Delay>,

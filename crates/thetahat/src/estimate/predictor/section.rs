@@ -5,7 +5,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::DMatrix;
 use thetahat_numerics::optimize::normal;
 use thetahat_numerics::regression::{
-    Interior, add_filtered, divide, divide_together, product, sum_of_squares,
+    Interior, add_filtered, add_scaled, divide, divide_together, product, sum_of_squares,
 };
 
 use super::{Column, Layout, loss};
@@ -60,6 +60,8 @@ pub(super) struct Section<'a> {
     /// Initial-condition responses that begin before the samples that count, and how far each is known; what follows is nothing.
     faded: Vec<f64>,
     faded_lengths: Vec<usize>,
+    /// The response of 1/F_j to an impulse, for each input with such initial conditions.
+    faded_responses: Vec<Vec<f64>>,
     pub(super) cost: f64,
     /// By how much the initial-condition responses alone can lower the cost.
     pub(super) free_gain: f64,
@@ -112,6 +114,7 @@ impl<'a> Section<'a> {
             free_floors: vec![0.0; free],
             faded: if layout.faded { vec![0.0; free * length] } else { Vec::new() },
             faded_lengths: vec![0; free],
+            faded_responses: layout.orders.nf.iter().map(|&nf| buffer(layout.faded && nf > 0)).collect(),
             cost: 0.0,
             free_gain: 0.0,
             runs,
@@ -124,7 +127,7 @@ impl<'a> Section<'a> {
         ends.map_or(0..0, |(first, last)| first.start..last.end)
     }
 
-    /// Sets the trial weights to those that are best for the polynomials.
+    /// The errors of polynomials with the trial weights that are best for them, and their sum of squares.
     ///
     /// For initial-condition responses that begin before the samples that count: a small change of F changes a faded response many times
     /// over, which no step of the weights to first order follows.
@@ -136,31 +139,48 @@ impl<'a> Section<'a> {
         let gain: f64 = polynomials.d.iter().map(|d| d.abs()).sum();
         let mut own = 0;
         for (j, &order) in layout.orders.nf.iter().enumerate() {
-            for delay in 0..layout.own_free[j] {
-                let memory = 1 + order + layout.orders.nc + layout.orders.nd;
-                let column = &mut self.faded[own * length..][..length];
-                let mut known = (FIRST_PIECE + layout.counted + 2 * memory).min(length);
-                let size = loop {
-                    let piece = &mut column[..known];
-                    piece.fill(0.0);
-                    piece[layout.origin + delay] = 1.0;
-                    divide(&polynomials.f[j], piece);
-                    let size = sum_of_squares(piece);
-                    if layout.orders.nd > 0 {
-                        multiply(&mut self.scratch, &polynomials.d, piece);
-                        piece.copy_from_slice(&self.scratch);
-                    }
-                    piece[..layout.conditioned].fill(0.0);
-                    divide(&polynomials.c, &mut piece[layout.conditioned..]);
-                    if known == length || is_quiet(piece, memory) {
-                        break size;
-                    }
-                    known = (4 * known).min(length);
-                };
-                self.faded_lengths[own] = known;
-                self.free_floors[own] = UNSEEN * gain * gain * size;
-                own += 1;
+            let count = layout.own_free[j];
+            if count == 0 {
+                continue;
             }
+            // That of an impulse one sample later is the same one sample later, up to the mask.
+            let (columns, response) =
+                (&mut self.faded[own * length..][..count * length], &mut self.faded_responses[j]);
+            let memory = 1 + order + layout.orders.nc + layout.orders.nd;
+            let mut known = (FIRST_PIECE + layout.counted + 2 * memory).min(length);
+            let size = loop {
+                response.clear();
+                response.resize(known - layout.origin, 0.0);
+                response[0] = 1.0;
+                divide(&polynomials.f[j], response);
+                let masked = if layout.orders.nd > 0 {
+                    multiply(&mut self.scratch, &polynomials.d, response);
+                    &self.scratch
+                } else {
+                    &*response
+                };
+                for (delay, column) in columns.chunks_exact_mut(length).enumerate() {
+                    let (head, tail) = column[..known].split_at_mut(layout.origin + delay);
+                    head.fill(0.0);
+                    tail.copy_from_slice(&masked[..tail.len()]);
+                    column[..layout.conditioned].fill(0.0);
+                }
+                let mut rest = columns.chunks_exact_mut(length).map(|c| &mut c[layout.conditioned..known]);
+                while let Some(one) = rest.next() {
+                    match rest.next() {
+                        Some(other) => divide_together(&polynomials.c, [one, other]),
+                        None => divide(&polynomials.c, one),
+                    }
+                }
+                let quiet = |column: &[f64]| is_quiet(&column[..known], memory);
+                if known == length || columns.chunks_exact(length).all(quiet) {
+                    break sum_of_squares(response);
+                }
+                known = (4 * known).min(length);
+            };
+            self.faded_lengths[own..own + count].fill(known);
+            self.free_floors[own..own + count].fill(UNSEEN * gain * gain * size);
+            own += count;
         }
         let counted = |column: usize, known: usize| &self.faded[column * length..][layout.counted..known];
         for row in 0..free {
@@ -175,6 +195,29 @@ impl<'a> Section<'a> {
         }
         normal::factor(&mut self.free_factor, free);
         normal::solve(&self.free_factor, free, &mut self.trial);
+        self.add_faded(layout);
+    }
+
+    /// Adds the initial-condition responses with the trial weights to what was evaluated without them.
+    fn add_faded(&mut self, layout: &Layout) {
+        let length = self.output.len();
+        let mut own = 0;
+        for (j, &count) in layout.own_free.iter().enumerate() {
+            for delay in 0..count {
+                let (weight, known) = (self.trial[own], self.faded_lengths[own]);
+                let rows = layout.origin + delay..known;
+                let response = &self.faded_responses[j][..rows.len()];
+                add_scaled(&mut self.responses[j][rows.clone()], weight, response);
+                if layout.orders.nd > 0 {
+                    add_scaled(&mut self.disturbance[rows], -weight, response);
+                }
+                let rows = layout.conditioned..known;
+                let column = &self.faded[own * length..][rows.clone()];
+                add_scaled(&mut self.signals[0][rows], -weight, column);
+                own += 1;
+            }
+        }
+        self.cost = self.squares(layout);
     }
 
     /// The errors of polynomials and of the trial weights, and their sum of squares.
@@ -207,11 +250,16 @@ impl<'a> Section<'a> {
         let (head, tail) = error.split_at_mut(layout.conditioned);
         head.fill(0.0);
         divide(&polynomials.c, tail);
+        self.cost = self.squares(layout);
+    }
+
+    /// sum e^2, or sum rho(e).
+    fn squares(&self, layout: &Layout) -> f64 {
         let each = self.runs.iter().map(|run| {
-            let errors = &error[run.clone()];
+            let errors = &self.signals[0][run.clone()];
             layout.bound.map_or_else(|| sum_of_squares(errors), |bound| loss::cost(errors, bound))
         });
-        self.cost = each.sum();
+        each.sum()
     }
 
     /// psi's signals, their Gram matrix and psi'e, at what was evaluated last.

@@ -229,5 +229,5 @@ pub(super) fn solve(sums: &NormalEquations, centred: &Centred) -> Result<Report,
     let spread = about.spread(DividedMonomials::TARGET).sqrt();
     report.fit.push(sums.one_step(&plan.outputs[0], (samples, mse), spread, InitialCondition::Drop));
     report.warnings = warnings(&report, &model);
-    Ok(report)
+    Ok(report.with_purpose())
 }

@@ -86,5 +86,5 @@ fn report(
     for ((signal, square), spread) in outputs.iter().zip(&squares).zip(spreads) {
         report.fit.push(sums.one_step(&signal.name, (samples, *square), *spread, InitialCondition::Drop));
     }
-    Ok(report)
+    Ok(report.with_purpose())
 }

@@ -147,6 +147,7 @@ pub fn fit_process_to_response(
         model: Model::from(own),
         estimation,
         fit: Vec::new(),
+        purpose: String::new(),
         warnings,
     })
 }

@@ -1,8 +1,10 @@
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 use crate::estimate::{Common, Point};
 use crate::select::candidates::{Samples, Trial};
+use crate::select::grid::key;
 use crate::select::search::Family;
 
 fn signals(seed: u64, length: usize) -> (Vec<f64>, Vec<f64>) {
@@ -18,6 +20,22 @@ fn grid(na: OrderRange, nb: OrderRange, nc: OrderRange, nd: OrderRange, nf: Orde
 
 /// All models of a grid, fitted to the same samples.
 fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Trial>, usize) {
+    let (tried, counted, hopeless) = family(record, grid, |_| None);
+    assert_eq!(hopeless, 0);
+    (tried, counted)
+}
+
+/// A criterion of a thousand samples.
+fn score(orders: &Orders, cost: f64, _: f64) -> f64 {
+    cost.ln() + 7e-3 * orders.parameters() as f64
+}
+
+/// The same, or besides some only those that may have the least score, and how many were not fitted.
+fn family(
+    record: &Record<'_>,
+    grid: &Grid,
+    essential: impl Fn(&[Trial]) -> Option<BTreeSet<Vec<usize>>>,
+) -> (Vec<Trial>, usize, usize) {
     let models = grid.orders(1).unwrap();
     let samples = Samples::new(record, Initial::Auto, &models).unwrap();
     let common = Common::new(record, true, samples.window, &Search::default(), Deadline::default(), &|_| {
@@ -26,9 +44,39 @@ fn fitted(record: &Record<'_>, grid: &Grid) -> (Vec<Trial>, usize) {
     .unwrap();
     let mut tried: Vec<Trial> =
         models.iter().map(|orders| Trial { orders: orders.clone(), point: None }).collect();
-    let score = |_: &Orders, point: &Point| point.cost.ln() * 1e3 + 7.0 * point.parameters.len() as f64;
-    Family::new(&tried, 1).fit(&common, &mut tried, &score).unwrap();
-    (tried, samples.window.counted)
+    let essential = essential(&tried);
+    let essential = essential.as_ref().map(|essential| (essential, 1000));
+    let hopeless = Family::new(&tried, 1).fit(&common, &mut tried, &score, essential).unwrap();
+    (tried, samples.window.counted, hopeless)
+}
+
+#[test]
+fn who_cannot_be_the_best_is_not_fitted_and_the_best_are_the_same() {
+    let (y, u) = signals(31, 500);
+    let record = record(&y, &[&u], &[0..300, 310..500]);
+    let grid = grid(0.into(), range(1, 3), range(0, 2), range(0, 2), range(1, 3));
+    let (all, ..) = family(&record, &grid, |_| None);
+    let oe = |tried: &[Trial]| -> BTreeSet<Vec<usize>> {
+        let without_noise = tried.iter().filter(|one| one.orders.nc + one.orders.nd == 0);
+        without_noise.map(|one| key(&one.orders)).collect()
+    };
+    let (some, _, hopeless) = family(&record, &grid, |tried| Some(oe(tried)));
+    let is_there = |one: &&Trial| one.point.is_some();
+    assert_eq!(some.iter().filter(is_there).count() + hopeless, all.iter().filter(is_there).count());
+    assert!(hopeless > 20, "{hopeless}");
+    let scored = |tried: &[Trial]| {
+        let of = |one: &Trial| Some((score(&one.orders, one.point.as_ref()?.cost, 0.0), key(&one.orders)));
+        let mut scored: Vec<(f64, Vec<usize>)> = tried.iter().filter_map(of).collect();
+        scored.sort_by(|a, b| a.0.total_cmp(&b.0));
+        scored
+    };
+    let (all, some) = (scored(&all), scored(&some));
+    let ((least, orders), (other, same)) = (&all[0], &some[0]);
+    assert!(orders == same && (least - other).abs() < 1e-6, "{orders:?} {least} {same:?} {other}");
+    let fitted: Vec<&Vec<usize>> = some.iter().map(|(_, orders)| orders).collect();
+    assert!(all.iter().all(|(score, orders)| fitted.contains(&orders) || score - least > 20.0 / 1000.0));
+    // What has to be fitted is.
+    assert_eq!(some.iter().filter(|(_, orders)| orders[2] + orders[3] == 0).count(), 9);
 }
 
 #[test]

@@ -286,7 +286,7 @@ fn a_closed_loop_is_pointed_out() {
     }
     let document = inspected(&Folder::with_log(csv(&[("u", &u), ("y", &y)])), "log.csv");
     assert_eq!(document["feedback"][0]["found"], true);
-    assert!(number(&document, "/feedback/0/p_value") < 0.01 && says(&document, "feedback is suspected"));
+    assert!(number(&document, "/feedback/0/p_value") < 0.01 && says(&document, "that is feedback"));
     let open = response(&[1.0, -0.9], &[(&[0.0, 0.5], &r)], &e);
     let document = inspected(&Folder::with_log(csv(&[("u", &r), ("y", &open)])), "log.csv");
     assert_eq!(document["feedback"][0]["found"], false);

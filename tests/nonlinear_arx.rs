@@ -44,6 +44,12 @@ fn every_verb_takes_a_network() {
     let auto = folder.fit("log.csv --narx auto --ny 2 --nu 2 --sample-time 0.1 --split 50/30/20");
     let outcome = &auto["estimation"]["maps"][0];
     assert_eq!(outcome["path"].as_array().map(Vec::len), Some(7));
+    // No time leaves the linear model, and says what was not tried.
+    let hurried = folder
+        .done("fit log.csv --narx auto --ny 2 --nu 2 --sample-time 0.1 --time-limit 1e-6 --report h.json");
+    assert!(hurried.stderr.contains("6 of 7 models were not tried"), "{}", hurried.stderr);
+    let report: Value = serde_json::from_str(&folder.read("h.json")).expect("a report");
+    assert_eq!(report["model"]["kind"], "polynomial");
     for (options, words) in [
         ("--narx tanh --terms 3", "units"),
         ("--narx poly --starts 3", "--starts"),

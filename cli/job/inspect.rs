@@ -8,10 +8,6 @@ use crate::args::{InspectArguments, Names};
 use crate::failure::Failure;
 use crate::shell::quoted;
 
-/// Delays that are tried where none was found, and at least.
-const LONGEST: usize = 20;
-const FEWEST: usize = 10;
-
 /// A log to inspect.
 #[derive(Debug)]
 pub(crate) struct InspectJob {
@@ -98,13 +94,6 @@ impl InspectJob {
             option("-u", &thetahat_table::list(&inputs));
         }
         option("-y", &output.name);
-        if let (Some(rest), false) = (inspection.rest, inputs.is_empty()) {
-            option("--detrend", &format!("start:{rest}"));
-            let delays = delays(inspection, &inputs);
-            for (name, value) in [("--model", "oe"), ("--nb", "1"), ("--nf", "1"), ("--nk", &delays)] {
-                option(name, value);
-            }
-        }
         let log = &arguments.log;
         for (name, value) in [
             ("--delimiter", &log.delimiter),
@@ -132,22 +121,6 @@ impl InspectJob {
         ];
         words.extend(flags.iter().filter(|(_, given)| *given).map(|(name, _)| (*name).to_owned()));
         Some(words.join(" "))
-    }
-}
-
-/// Delays to try: of one input up to twice that which was found, or 20; of several those that were found, as all combinations
-/// would be many.
-fn delays(inspection: &Inspection, inputs: &[&str]) -> String {
-    let found = |name: &str| inspection.delays.iter().find(|of| of.input == name).and_then(|of| of.nk);
-    match inputs {
-        [one] => {
-            let (first, last) = found(one).map_or((1, LONGEST), |nk| (nk.min(1), (2 * nk).max(FEWEST)));
-            format!("{first}..{last}")
-        }
-        several => {
-            let each: Vec<String> = several.iter().map(|name| found(name).unwrap_or(1).to_string()).collect();
-            each.join(",")
-        }
     }
 }
 

@@ -585,6 +585,12 @@ def fit(
     'polynomial'
     """
     more = [] if narx is None else [f"--narx={_options.text('narx', narx)}"]
+    if isinstance(log, Log) and len(log.outputs) > 1 and not log.inputs:
+        *others, last = log.outputs
+        raise ValueError(
+            f"log: {', '.join(others)} and {last} are all outputs, and there is no input; give the inputs apart, as "
+            f"Log(frame[{last!r}], frame[{others!r}])"
+        )
     return _fit(None, locals(), *more)
 
 

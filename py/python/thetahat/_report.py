@@ -25,7 +25,8 @@ class Decision:
     Attributes
     ----------
     kind : str
-        What was found: ``"feedback"``, ``"integration"``, ``"nonlinear"``, ``"few_sinusoids"`` or ``"in_motion"``.
+        What was found: ``"feedback"``, ``"integration"``, ``"drift"``, ``"outliers"``, ``"nonlinear"``, ``"few_sinusoids"`` or
+        ``"in_motion"``.
     channels : list of str
         The channels that it is about; none where it is the whole log.
     because : str
@@ -419,6 +420,21 @@ class ReportedModel:
     def fits(self) -> list[dict[str, Any]]:
         """How well the model fits: one entry for each part of the log and horizon."""
         return list(self.document["fit"])
+
+    @property
+    def purpose(self) -> str:
+        """What the model is good for, in one sentence: prediction, simulation, control design up to which frequency.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> rng = np.random.default_rng(1)
+        >>> u = rng.standard_normal(1000)
+        >>> y = np.convolve(u, 0.5 ** np.arange(1, 20))[:1000] + 0.1 * rng.standard_normal(1000)
+        >>> print(th.fit(th.Log(u=u, y=y, sample_time=1.0)).purpose)
+        """
+        return self.document.get("purpose", "")
 
     @property
     def decisions(self) -> list[Decision]:

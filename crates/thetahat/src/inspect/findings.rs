@@ -224,14 +224,15 @@ fn levels(inspection: &Inspection) -> Vec<Finding> {
         if share >= TREND && inspection.rest.is_none() {
             let percent = fixed(100.0 * share, 0);
             let seen = format!("channel '{}' has a trend that explains {percent} % of it", channel.name);
-            let advice = "if that is drift and no answer to an input, fit with `detrend` linear";
+            let advice = "a fit that chooses the orders looks for noise that drifts; if it is a straight line and no answer to an \
+                          input, fit with `detrend` linear";
             findings.push(Finding::new(FindingKind::Trend, seen, advice).of(&channel.name));
         }
     }
     if let Some(rest) = inspection.rest {
         let advice = format!(
-            "its means are no level of the plant; take the offsets from there (`detrend` start:{rest}), and estimate the output's \
-             slope with the parameters if it drifts (`trend`)"
+            "its means are no level of the plant; in a fit that chooses the orders processes from rest compete; with orders of your own \
+             take the offsets from there (`detrend` start:{rest}), and estimate the output's slope with the parameters if it drifts (`trend`)"
         );
         let seen = format!("the log is a step test that begins at rest for {rest} rows");
         let rows = Rows::from_positions(&(0..rest));
@@ -254,8 +255,12 @@ fn effects(inspection: &Inspection) -> Vec<Finding> {
     }
     for feedback in inspection.feedback.iter().filter(|feedback| feedback.found) {
         let seen = format!("input '{}' follows past errors of the output", feedback.input);
-        let advice = "feedback is suspected; fit a model with noise (arx, armax, bj), as oe and `method` iv or sriv are biased in a \
-                      closed loop";
+        let advice = if feedback.certain {
+            "that is feedback, and a fit that chooses the orders takes a model with noise (arx, armax, bj) by its errors one step \
+             ahead, as oe and `method` iv or sriv are biased in a closed loop"
+        } else {
+            "feedback is suspected; fit a model with noise (arx, armax, bj), as oe and `method` iv or sriv are biased in a closed loop"
+        };
         findings.push(Finding::new(FindingKind::Feedback, seen, advice).of(&feedback.input));
     }
     for delay in &inspection.delays {

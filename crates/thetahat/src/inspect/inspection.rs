@@ -237,6 +237,9 @@ pub struct Feedback {
     pub explained: Option<f64>,
     /// Whether feedback is suspected: the p-value is below 1 %, and they explain more than 0.5 %.
     pub found: bool,
+    /// Whether there is feedback beyond doubt: a fit that chooses the orders then leaves out what is biased by it.
+    #[serde(default)]
+    pub certain: bool,
 }
 
 impl Feedback {
@@ -246,6 +249,7 @@ impl Feedback {
             p_value: found.map(|found| found.p_value),
             explained: found.map(|found| found.explained),
             found: found.is_some_and(|found| found.is_suspected()),
+            certain: found.is_some_and(|found| found.is_certain()),
         }
     }
 }

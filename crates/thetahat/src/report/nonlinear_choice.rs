@@ -1,13 +1,14 @@
 //! Fits of nonlinear ARX models: of a map that is named, or of the best of all, among which a linear model takes part.
 
 use std::ops::ControlFlow;
+use std::time::Duration;
 
-use thetahat_numerics::optimize::Monitor;
+use thetahat_numerics::optimize::{Deadline, Monitor, Search};
 
 use super::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
 use crate::Error;
 use crate::data::{Log, Rows, Source};
-use crate::estimate::{MapsOutcome, Procedure, RunFigures, TermStep};
+use crate::estimate::{MapsOutcome, Method, Procedure, RunFigures, TermStep};
 use crate::model::{Activation, Model};
 use crate::report::shares::Shares;
 use crate::report::{Plan, Report, apply, identify_monitored};
@@ -19,6 +20,9 @@ use crate::validate::{Fit, Part};
 /// What is tried beside a linear model: degrees of products, and units of networks.
 const DEGREES: [usize; 2] = [2, 3];
 const UNITS: [usize; 2] = [2, 4];
+/// Of a time limit the choice of a linear model may take the first part, all models together the second; the rest is for the last fit.
+const FOR_LINEAR: f64 = 0.2;
+const FOR_ALL: f64 = 0.6;
 /// A simpler model is taken if its error on held-out rows is no more than this many times the least.
 const CLEARLY: f64 = 1.1;
 /// A model whose run leaves this many times the measured range, about its middle, is taken only where all do. Good models of plants that
@@ -129,7 +133,10 @@ fn best(
         None => (shares.estimation, shares.validation),
     };
     let parts = Parts { log, sources, estimation, held_out, monitor };
-    let linear = parts.linear(plan)?;
+    let limit = plan.search.time_limit;
+    let part = |share: f64| limit.map(|limit| limit.mul_f64(share));
+    let (for_all, whole) = (Deadline::after(part(FOR_ALL)), Deadline::after(limit));
+    let linear = parts.linear(plan, part(FOR_LINEAR))?;
     let mut plans = Vec::new();
     let lags = lags(plan, linear.as_ref());
     for map in maps() {
@@ -149,7 +156,13 @@ fn best(
         }
     }
     let (mut tried, mut refused): (Vec<Tried>, Option<Error>) = (linear.into_iter().collect(), None);
-    for plan in plans {
+    let mut untried = 0;
+    for mut plan in plans {
+        if for_all.is_over() && !tried.is_empty() {
+            untried += 1;
+            continue;
+        }
+        plan.search.time_limit = for_all.left();
         match parts.nonlinear(plan) {
             Ok(one) => tried.extend(one),
             Err(Error::Interrupted) => return Err(Error::Interrupted),
@@ -165,8 +178,9 @@ fn best(
     let taken = tried.iter().position(is_near).unwrap_or(0);
     let path: Vec<TermStep> = tried.iter().map(|one| one.step.clone()).collect();
     let Tried { plan: own, report, .. } = tried.swap_remove(taken);
-    match own {
-        Some(own) => {
+    let mut report = match own {
+        Some(mut own) => {
+            own.search.time_limit = whole.left();
             // Without a split it was fitted to all estimation rows.
             let mut report = match plan.split {
                 Some(_) => fit_planned(log, sources, &of_all_rows(own, plan), monitor)?,
@@ -185,19 +199,27 @@ fn best(
                 outcome
             });
             report.estimation.procedure = Procedure::Training(MapsOutcome { maps: maps.collect() });
-            Ok(report)
+            report
         }
         None => {
-            let mut report = identify_monitored(log.clone(), sources, &linear_plan(plan), monitor)?;
+            let linear = linear_plan(plan, whole.left());
+            let mut report = identify_monitored(log.clone(), sources, &linear, monitor)?;
             if let Some(selection) = &mut report.selection {
                 selection.steps.push(
                     "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on rows held out."
                         .to_owned(),
                 );
             }
-            Ok(report)
+            report
         }
+    };
+    if untried > 0 {
+        report.warnings.push(format!(
+            "time was up: {untried} of {} models were not tried; allow more (`time-limit`)",
+            path.len() + untried
+        ));
     }
+    Ok(report)
 }
 
 /// The plan of a model that was tried, for all rows of the choice.
@@ -239,7 +261,7 @@ fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan
 }
 
 /// The plan of a linear model of the same channels and rows, which the data choose.
-fn linear_plan(plan: &NonlinearArxPlan) -> Plan {
+fn linear_plan(plan: &NonlinearArxPlan, time_limit: Option<Duration>) -> Plan {
     let inputs: Vec<&str> = plan.inputs.iter().map(String::as_str).collect();
     let output = plan.outputs.first().map_or("", String::as_str);
     Plan {
@@ -248,6 +270,7 @@ fn linear_plan(plan: &NonlinearArxPlan) -> Plan {
         split: plan.split,
         detrend: plan.detrend,
         offsets: plan.offsets.clone(),
+        method: Method::PredictionError(Search { time_limit, ..Search::default() }),
         ..Plan::new(&inputs, output, Choice::Automatic(Automatic { linear: true, ..Automatic::default() }))
     }
 }
@@ -258,12 +281,12 @@ impl Parts<'_> {
     }
 
     /// The linear model; none where these rows determine none.
-    fn linear(&self, plan: &NonlinearArxPlan) -> Result<Option<Tried>, Error> {
+    fn linear(&self, plan: &NonlinearArxPlan, limit: Option<Duration>) -> Result<Option<Tried>, Error> {
         let own = Plan {
             estimate: self.estimation.clone(),
             validate: Vec::new(),
             split: None,
-            ..linear_plan(plan)
+            ..linear_plan(plan, limit)
         };
         match identify_monitored(self.log.clone(), self.sources, &own, self.monitor) {
             Ok(report) => {

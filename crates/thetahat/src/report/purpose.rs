@@ -163,3 +163,68 @@ fn unknown_gains(linear: &[LinearModel<'_>]) -> Option<String> {
         _ => Some(format!("the static gains of {} are not known", names.join(", "))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::{Channel, Log};
+    use crate::model::{Interval, Orders};
+    use crate::report::{Plan, identify};
+
+    /// y(t) = 0.9 y(t-1) + b u(t-1) + e(t).
+    fn report(b: f64, inputs: &[&str]) -> Report {
+        let (mut u, mut y, mut random) = (vec![], vec![0.0], 1_u32);
+        let mut draw = || {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(random >> 8) / f64::from(1 << 23) - 1.0
+        };
+        for t in 0..600 {
+            u.push(draw());
+            y.push(0.9 * y[t] + b * u[t] + 0.1 * draw());
+        }
+        y.pop();
+        let channel = |name: &str, values| Channel { name: name.into(), values };
+        let log = Log::new(vec![channel("u", u), channel("y", y)], 0.5).unwrap();
+        let one = vec![1; inputs.len()];
+        identify(log, &[], &Plan::new(inputs, "y", Orders::arx(1, &one, &one).unwrap())).unwrap()
+    }
+
+    #[test]
+    fn a_good_model_simulates_and_is_known_at_all_frequencies() {
+        let report = report(1.0, &["u"]);
+        let [one, free] = [0, 1].map(|place| fixed(report.fit[place].percent.unwrap(), 1));
+        let expected = format!(
+            "Good for prediction one step ahead ({one} % on the rows of the fit), simulation ({free} % on the rows of the fit) and \
+             control design at all frequencies, where its response is known within 30 %."
+        );
+        assert_eq!(report.purpose, expected);
+    }
+
+    #[test]
+    fn what_is_not_known_is_said() {
+        let weak = report(0.01, &["u"]);
+        assert!(weak.purpose.contains("its free run fits"), "{}", weak.purpose);
+        assert!(
+            weak.purpose
+                .contains("no frequency has a response that is known within 30 %; the static gain of u"),
+            "{}",
+            weak.purpose
+        );
+        let series = report(1.0, &[]);
+        assert!(series.purpose.starts_with("Good for prediction one step ahead ("), "{}", series.purpose);
+        assert!(!series.purpose.contains("simulation") && !series.purpose.contains("control"));
+        let mut open = report(1.0, &["u"]);
+        let Model::Polynomial(model) = &mut open.model else { panic!("an ARX model") };
+        model.dc_gain[0].as_mut().unwrap().interval = Some(Interval::OPEN);
+        assert!(open.with_purpose().purpose.ends_with("; the static gain of u is not known."));
+    }
+
+    #[test]
+    fn without_figures_and_errors_nothing_is_said() {
+        let mut report = report(1.0, &["u"]);
+        report.fit.clear();
+        let Model::Polynomial(model) = &mut report.model else { panic!("an ARX model") };
+        model.covariance = None;
+        assert_eq!(report.with_purpose().purpose, "");
+    }
+}

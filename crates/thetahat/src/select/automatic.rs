@@ -10,7 +10,7 @@ use super::delay;
 use super::grid::key;
 use super::linear::{Columns, Fitted, Scaled};
 use super::ranking::ranked;
-use super::{Automatic, EXACT, Focus, SelectedModel, Selection, Task};
+use super::{Automatic, Delay, EXACT, Focus, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::data::{Decision, FindingKind, Record};
 use crate::estimate::{Initial, pays, stretches};
@@ -43,6 +43,8 @@ const DIAGONAL_OE: [[usize; 4]; 8] = [
     [6, 6, 0, 0],
 ];
 const DIAGONAL_BJ: [[usize; 4]; 5] = [[1, 1, 1, 1], [2, 2, 1, 1], [2, 2, 2, 2], [3, 3, 1, 1], [4, 4, 1, 1]];
+/// The least probability of a delay that is certain.
+const CERTAIN: f64 = 0.99;
 /// Orders of ARX models that say whether a constant is worth a parameter.
 const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
 
@@ -97,7 +99,10 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     let mut essential: Vec<Orders> = Vec::new();
     if task.looks_further() && automatic.nk.is_none() {
         let least = usize::from(follows.contains(&true));
-        for delay in (least..=1).rev() {
+        // What acts within the same sample for certain has no later delay.
+        let at_once = |of: &Delay| of.nk == 0 && of.confidence.is_some_and(|confidence| confidence > CERTAIN);
+        let most = usize::from(!delays.iter().any(at_once));
+        for delay in (least..=most).rev() {
             essential.extend(diagonal(task.estimation, &structures, &vec![delay; inputs])?);
         }
     }

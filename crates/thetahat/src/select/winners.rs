@@ -5,9 +5,8 @@
 //! Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
 //!
 //! 1. P has the least criterion among stable models. S has the least error where it was not fitted to (see `held_out`): the
-//!    mean of two logarithms, of the mean square on blocks and of that onward from the first row; of models whose errors are no
-//!    more than [`NEAR`] standard errors of the difference larger, the smallest is S. Where C ended on the unit circle, a search
-//!    has stopped for want of room, at a point that rounding decides: such a model is no S.
+//!    mean of two logarithms, of the mean square on blocks and of that onward from the first row. Where C ended on the unit
+//!    circle, a search has stopped for want of room, at a point that rounding decides: such a model is no S.
 //! 2. S is taken where that mean is lower by more than [`FAR`] than with P, or by more than [`GATE`], both logarithms by half of
 //!    it, and the mean square on the blocks by more than [`STANDARD_ERRORS`] of its difference's; else P. (On blocks alone a slow
 //!    mode that only their initial states excite takes up what is noise.)
@@ -24,9 +23,6 @@ pub(super) const FAR: f64 = 0.3;
 /// By how much where the fall is certain.
 pub(super) const GATE: f64 = 0.1;
 const STANDARD_ERRORS: f64 = 2.0;
-/// A smaller model within so many standard errors simulates as well (Breiman, Friedman, Olshen and Stone, Classification and Regression Trees,
-/// 1984, section 3.4.3).
-const NEAR: f64 = 1.0;
 const CLEARLY: f64 = 0.1;
 /// A model that simulates has no time constant of more than this many times the samples.
 const SLOWEST: f64 = 2.0;
@@ -57,21 +53,8 @@ pub(super) fn winners(focus: Focus, models: &[&Compared], samples: usize) -> Opt
     let both = |k: usize| held_out(k).map(HeldOut::both);
     let inside = |k: &usize| !models[*k].has_ended_on_circle();
     let figures = (0..models.len()).filter(fast).filter(inside).filter_map(|k| Some((both(k)?, k)));
-    let figures: Vec<(f64, usize)> = figures.collect();
-    let best = figures.iter().min_by(|(one, _), (other, _)| one.total_cmp(other));
-    let is_near = |&&(figure, k): &&(f64, usize)| {
-        let Some(&(least, best)) = best else { return false };
-        let parts = models[k].parts.as_ref().zip(models[best].parts.as_ref());
-        k == best
-            || figure - least <= GATE
-                && parts.is_some_and(|(own, of_best)| standard_errors(own, of_best) <= NEAR)
-    };
-    let near = figures.iter().filter(is_near);
-    let smallest = near.min_by(|(one, a), (other, b)| {
-        let size = |k: usize| models[k].scored.parameters;
-        size(*a).cmp(&size(*b)).then(one.total_cmp(other))
-    });
-    let simulation = smallest.map_or(prediction, |(_, k)| *k);
+    let least = figures.min_by(|(one, _), (other, _)| one.total_cmp(other));
+    let simulation = least.map_or(prediction, |(_, k)| k);
     let fall = both(prediction).zip(both(simulation)).map_or(0.0, |(one, other)| one - other);
     let each_falls = held_out(prediction).zip(held_out(simulation)).is_some_and(|(one, other)| {
         let falls = |square: fn(&HeldOut) -> f64| logarithm(square(one)) - logarithm(square(other));

@@ -129,7 +129,11 @@ impl<'l> Nonlinear<'l> {
     fn ranked(&self, task: &Task<'_>, selection: &Selection) -> Vec<Rival> {
         let whole = task.named_record();
         let record = few_for_blocks(&whole, &whole);
-        let run = |plan: NonlinearArxPlan, what: String| {
+        let run = |mut plan: NonlinearArxPlan, what: String| {
+            if task.deadline.is_over() {
+                return None;
+            }
+            plan.search.time_limit = task.deadline.left();
             let seen = self.on_blocks(&record, selection.level_window, &plan, task.monitor)?;
             Some(Rival { plan, what, seen })
         };

@@ -432,9 +432,11 @@ class ReportedModel:
         >>> rng = np.random.default_rng(1)
         >>> u = rng.standard_normal(1000)
         >>> y = np.convolve(u, 0.5 ** np.arange(1, 20))[:1000] + 0.1 * rng.standard_normal(1000)
-        >>> print(th.fit(th.Log(u=u, y=y, sample_time=1.0)).purpose)
+        >>> th.fit(th.Log(u=u, y=y, sample_time=1.0)).purpose.split(" (")[0]
+        'Good for prediction one step ahead'
         """
-        return self.document.get("purpose", "")
+        purpose: str = self.document.get("purpose", "")
+        return purpose
 
     @property
     def decisions(self) -> list[Decision]:

@@ -111,7 +111,7 @@ fn held_out(report: &Report) -> Option<(f64, &'static str)> {
 fn band(linear: &[LinearModel<'_>]) -> Option<Option<String>> {
     let highest = PI / linear.first()?.sample_time();
     let frequencies = logarithmic_frequencies(BELOW * highest, highest, FREQUENCIES).ok()?;
-    let mut known = vec![true; FREQUENCIES];
+    let mut known = [true; FREQUENCIES];
     for model in linear {
         let responses = model.frequency_response(&frequencies).ok()?;
         for response in responses.iter().filter(|response| response.input.is_some()) {

@@ -6,11 +6,11 @@
 //! best. Without that a slow pole of a plant is rewarded for following the drift.
 
 use super::Task;
-use super::candidates::{Samples, Trial};
+use super::candidates::Trial;
 use super::held_out::radius;
 use crate::Error;
-use crate::data::{Differenced, Record};
-use crate::estimate::{Common, Point};
+use crate::data::Record;
+use crate::estimate::{Estimate, Initial, Method, estimate_of_channels, with_noise_integrator};
 use crate::model::{Orders, polynomial::roots};
 
 /// A noise with no slower real root than this does not drift.
@@ -52,8 +52,7 @@ pub(super) struct Drift {
     pub(super) integrates: bool,
 }
 
-/// What drifts, by the noise of the model with the least criterion; none where nothing does. Two searches, of which one is at its end
-/// already.
+/// What drifts, by the noise of the model with the least criterion; none where nothing does. Two searches.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -64,31 +63,27 @@ pub(super) fn drift(task: &Task<'_>, record: &Record<'_>, model: &Trial) -> Resu
     let own = if orders.nd > 0 { after_c..after_c + orders.nd } else { 0..orders.na };
     let noise = slowest_real(&point.parameters[own]);
     let Some(with) = integrating(orders).filter(|_| noise > SLOW) else { return Ok(None) };
-    // The same samples for both. Of changes a level says nothing.
-    let Samples { window, .. } = Samples::unknown(record, [orders, &with].into_iter());
-    let fitted = |record: &Record<'_>, orders: &Orders, starts: &[Vec<f64>], recipes: bool| {
-        let common = Common::new(record, true, window, task.search, task.deadline, task.monitor)?;
-        common.fit(orders, starts, recipes)
-    };
-    let changes = Differenced::new(record);
-    let mut of_changes = changes.record();
-    of_changes.inputs.truncate(task.inputs.len());
+    let method = Method::PredictionError(task.search.clone());
+    let free = estimate_of_channels(record, task.inputs, orders, &method, Initial::Auto, task.monitor);
+    let named = Record { inputs: record.inputs[..task.inputs.len()].to_vec(), ..record.clone() };
     let with = task.named(&with);
-    let with = Orders { nd: with.nd - 1, ..with };
-    let free = fitted(record, orders, std::slice::from_ref(&point.parameters), false)?;
-    let Some((free, integrated)) = free.zip(fitted(&of_changes, &with, &[], true)?) else { return Ok(None) };
-    let samples =
-        record.segments.iter().map(|segment| segment.len().saturating_sub(window.counted)).sum::<usize>()
-            as f64;
-    let mdl = |point: &Point| {
-        (point.cost / samples).ln() + (point.initial + point.parameters.len() as f64 * samples.ln()) / samples
+    let integrated = with_noise_integrator(&named, &with, task.inputs, task.search, task.monitor);
+    let (free, integrated) = match (free, integrated) {
+        (Err(Error::Interrupted), _) | (_, Err(Error::Interrupted)) => return Err(Error::Interrupted),
+        (Ok(free), Ok(integrated)) => (free, integrated),
+        _ => return Ok(None),
     };
-    let integrates = mdl(&integrated) <= mdl(&free);
+    // The root is no parameter that the data chose.
+    let mdl = |estimate: &Estimate, parameters: usize| {
+        let samples = free.samples() as f64;
+        estimate.mse().ln() + parameters as f64 * samples.ln() / samples
+    };
+    let integrates = mdl(&integrated, with.parameters() - 1) <= mdl(&free, orders.parameters());
     let plant =
-        if integrates { radius(&with, &integrated.parameters) } else { radius(orders, &point.parameters) };
+        if integrates { radius(&with, integrated.parameters()) } else { radius(orders, &point.parameters) };
     let time = |root: f64| -1.0 / root.min(1.0 - 1e-9).ln();
-    let first = before_c(&with);
-    let white = slowest_real(&integrated.parameters[first..first + with.nc]);
+    let (samples, first) = (free.samples() as f64, before_c(&with));
+    let white = slowest_real(&integrated.parameters()[first..first + with.nc]);
     let drifts = if integrates {
         // A root of C beside the 1 of D says that there is neither.
         time(white) < samples / LEAST

@@ -176,10 +176,11 @@ fn thinned<'a>(task: &Task<'a>, sparing: bool) -> Option<Record<'a>> {
     if is_long { stretches(task.estimation, SEGMENTS, length.min(SEGMENT)) } else { None }
 }
 
-/// Leaves out the models whose searches take too long; and what there is to say of that.
+/// Leaves out the models whose searches take too long, but for the smallest of all; and what there is to say of that.
 pub(super) fn keep_quick(task: &Task<'_>, models: &mut Vec<Orders>) -> Option<String> {
     let samples = thinned(task, true).map_or_else(|| total(task.estimation), |thin| total(&thin)).max(1);
-    let most = (MOST_OPERATIONS / samples as f64).sqrt() as usize;
+    let least = models.iter().map(Orders::parameters).min().unwrap_or(0);
+    let most = ((MOST_OPERATIONS / samples as f64).sqrt() as usize).max(least);
     let all = models.len();
     models.retain(|orders| orders.is_linear() || orders.parameters() <= most);
     (models.len() < all).then(|| {

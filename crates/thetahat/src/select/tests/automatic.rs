@@ -1,4 +1,5 @@
 use super::*;
+use crate::select::compare::keep_quick;
 
 const F: [f64; 3] = [1.0, -1.5, 0.7];
 
@@ -181,4 +182,36 @@ fn data_without_noise_have_their_own_orders() {
     let selection = automatic(&Record::new(&y, vec![&u]).unwrap(), None, None).unwrap();
     assert_eq!(selection.chosen.parameters, 4, "{:?}", selection.steps);
     assert_eq!((selection.chosen.orders.nk[0], selection.chosen.mse), (2, 0.0));
+}
+
+/// One step of a search for 50 parameters takes more than the budget has.
+#[test]
+fn the_smallest_models_stay_whatever_their_searches_take() {
+    let mut noise = Noise(211);
+    let y = noise.take(5000);
+    let inputs: Vec<Vec<f64>> = (0..25).map(|_| noise.take(5000)).collect();
+    let record = Record::new(&y, inputs.iter().map(Vec::as_slice).collect()).unwrap();
+    let (names, search) = (vec![String::new(); 25], Search::default());
+    let task = Task {
+        estimation: &record,
+        validation: None,
+        inputs: &names,
+        select: Select::MDL,
+        focus: Focus::Auto,
+        initial: Initial::Auto,
+        may_drift: false,
+        search: &search,
+        deadline: Deadline::default(),
+        monitor: &|_| ControlFlow::Continue(()),
+    };
+    let (one, two) = (vec![1; 25], vec![2; 25]);
+    let oe = |orders: &[usize]| Orders::oe(orders, orders, &one).unwrap();
+    let arx = Orders::arx(4, &two, &one).unwrap();
+    let mut models = vec![oe(&two), oe(&one)];
+    assert!(keep_quick(&task, &mut models).is_some_and(|said| said.contains("at most 50 parameters")));
+    assert_eq!(models, [oe(&one)]);
+    // What needs no search stays too.
+    let mut models = vec![arx.clone(), oe(&two), Orders::arx(1, &one, &one).unwrap()];
+    assert!(keep_quick(&task, &mut models).is_some());
+    assert_eq!(models, [arx, Orders::arx(1, &one, &one).unwrap()]);
 }

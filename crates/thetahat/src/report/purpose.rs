@@ -11,7 +11,8 @@ use crate::select::HeldOut;
 use crate::validate::Part;
 use thetahat_numerics::distribution::two_sided;
 
-/// A free run that fits less is no simulation, in percent.
+/// What fits less predicts nothing; a free run that fits less is no simulation. In percent.
+const PREDICTS: f64 = 10.0;
 const SIMULATES: f64 = 50.0;
 /// A response is known where its magnitude is within this part of it, with a probability of 95 %.
 const KNOWN: f64 = 0.3;
@@ -32,10 +33,12 @@ fn purpose(report: &Report) -> String {
     let (drifts, driven) = (has(FindingKind::Drift), report.model.is_driven());
     let (mut good, mut limits) = (Vec::new(), Vec::new());
     match figure(report, Horizon::Steps { steps: 1 }) {
-        Some((percent, rows)) if percent > 0.0 => {
+        Some((percent, rows)) if percent >= PREDICTS => {
             good.push(format!("prediction one step ahead ({} % {rows})", fixed(percent, 1)));
         }
-        Some(_) => limits.push("its errors one step ahead are as large as the output varies".to_owned()),
+        Some((percent, rows)) => {
+            limits.push(format!("its predictions one step ahead fit {} % {rows}", fixed(percent, 1)));
+        }
         None => {}
     }
     let run = if drifts { held_out(report) } else { None };
@@ -209,6 +212,15 @@ mod tests {
                 .contains("no frequency has a response that is known within 30 %; the static gain of u"),
             "{}",
             weak.purpose
+        );
+        let nothing = report(0.0, &["u"]).purpose;
+        assert!(!nothing.contains("simulation") && nothing.contains("its free run fits"), "{nothing}");
+        let mut nothing = report(0.01, &["u"]);
+        nothing.fit.iter_mut().for_each(|fit| fit.percent = Some(0.2));
+        let nothing = nothing.with_purpose().purpose;
+        assert!(
+            nothing.starts_with("Good for little: its predictions one step ahead fit 0.2 % on the rows of the fit; its free run fits 0.2 %"),
+            "{nothing}"
         );
         let series = report(1.0, &[]);
         assert!(series.purpose.starts_with("Good for prediction one step ahead ("), "{}", series.purpose);

@@ -45,6 +45,8 @@ const DIAGONAL_OE: [[usize; 4]; 8] = [
 const DIAGONAL_BJ: [[usize; 4]; 5] = [[1, 1, 1, 1], [2, 2, 1, 1], [2, 2, 2, 2], [3, 3, 1, 1], [4, 4, 1, 1]];
 /// The least probability of a delay that is certain.
 const CERTAIN: f64 = 0.99;
+/// At least this many samples for each parameter of a model in which several inputs have denominators.
+const SAMPLES_OF_DENOMINATORS: usize = 10;
 /// Orders of ARX models that say whether a constant is worth a parameter.
 const CONSTANT_ORDERS: [usize; 2] = [2, LONGEST];
 
@@ -111,6 +113,16 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
         essential.extend(models.iter().filter(|orders| orders.nc + orders.nd == 0).cloned());
     }
     models.extend(essential.iter().cloned());
+    let supported = |orders: &Orders| has_enough_for_denominators(task.estimation, orders);
+    if automatic.structure.is_none() && models.iter().any(supported) {
+        let before = models.len();
+        models.retain(supported);
+        if models.len() < before {
+            steps.push(format!(
+                "Not tried: OE and Box-Jenkins models of several inputs that have fewer than {SAMPLES_OF_DENOMINATORS} samples for a parameter."
+            ));
+        }
+    }
     let essential: BTreeSet<Vec<usize>> =
         essential.iter().map(|orders| key(&task.with_constants(orders))).collect();
     let mut seen = BTreeSet::new();
@@ -168,6 +180,13 @@ fn without(orders: &Orders, idle: &[usize]) -> Orders {
         (orders.nb[input], orders.nf[input]) = (0, 0);
     }
     orders
+}
+
+/// Whether there are enough samples for denominators of several inputs: a pole of an input that hardly acts is found near the unit
+/// circle by chance, and free runs go away with it.
+fn has_enough_for_denominators(record: &Record<'_>, orders: &Orders) -> bool {
+    let denominators = orders.nf.iter().filter(|&&nf| nf > 0).count();
+    denominators < 2 || total(record) >= SAMPLES_OF_DENOMINATORS * orders.parameters()
 }
 
 /// A warning of orders that are the highest that were tried of their structure.

@@ -90,8 +90,12 @@ fn the_confidence_is_the_posterior_weight_of_the_delay() {
         let target = DVector::from_column_slice(&y[4..]);
         let theta = (x.transpose() * &x).try_inverse().unwrap() * (x.transpose() * &target);
         let mdl = ((target - x * theta).norm_squared() / 36.0).ln() + lags as f64 * 36.0_f64.ln() / 36.0;
-        // Lag 0 costs one more ln(N)/N.
-        let weight = (-18.0 * mdl).exp() * if start == 0 && end > 0 { 1.0 / 6.0 } else { 1.0 };
+        // Lag 0 costs one more ln(N)/N, a delay of nk > 0 costs 2 ln(nk)/N.
+        let prior = match start {
+            0 if end > 0 => 1.0 / 6.0,
+            nk => 1.0 / nk.max(1) as f64,
+        };
+        let weight = (-18.0 * mdl).exp() * prior;
         all += weight;
         own += if start == found[0].nk && end > 0 { weight } else { 0.0 };
     }
@@ -173,6 +177,29 @@ fn short_logs_have_fewer_models() {
     }
     let nothing = Record::new(&y[..2], vec![&u[..2]]).unwrap();
     assert!(matches!(automatic(&nothing, None, None), Err(Error::Undetermined { .. })));
+}
+
+#[test]
+fn few_samples_of_several_inputs_have_one_denominator() {
+    let mut noise = Noise(107);
+    let inputs: Vec<Vec<f64>> = (0..4).map(|_| noise.take(200)).collect();
+    let y =
+        sum(&filtered(&[0.0, 1.0], &[1.0, -0.8], &sum(&inputs[0], &inputs[1], -0.6)), &noise.take(200), 0.3);
+    let denominators = |orders: &Orders| orders.nf.iter().filter(|&&nf| nf > 0).count();
+    for (rows, several) in [(60, false), (200, true)] {
+        let u = inputs.iter().map(|u| &u[..rows]).collect();
+        let record = Record::new(&y[..rows], u).unwrap();
+        let selection = automatic(&record, None, None).unwrap();
+        let found = selection.best.iter().map(|model| &model.orders);
+        let small: Vec<&Orders> =
+            found.filter(|orders| denominators(orders) > 1 && rows < 10 * orders.parameters()).collect();
+        assert!(small.is_empty(), "{rows} rows: {small:?}");
+        let wide = selection.best.iter().any(|model| denominators(&model.orders) == 4);
+        assert_eq!(wide, several, "{rows} rows: {:?}", selection.steps);
+        // Who asks for the structure has it.
+        let asked = automatic(&record, Some(Structure::Oe), None).unwrap();
+        assert_eq!(asked.chosen.orders.structure(), Structure::Oe);
+    }
 }
 
 #[test]

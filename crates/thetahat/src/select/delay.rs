@@ -6,9 +6,6 @@
 //! apart, and most plants that are sampled answer later. So an input that follows the output for certain (see `validate::feedback`)
 //! has no lag 0.
 //!
-//! A window that begins at nk > 0 costs 2 ln(nk), which is what a prior of 1/nk says in -2 ln(likelihood) (Rissanen, Annals of
-//! Statistics 11, 1983, section 3: the length of an integer): of many late windows one fits few samples by chance.
-//!
 //! The confidence in a delay k is its posterior probability among all windows W that were compared,
 //!
 //! ```text
@@ -39,8 +36,7 @@ const DELAY_ORDER: usize = 10;
 const DELAY_LAGS: usize = 14;
 /// Lags at most, where a delay seems to be longer.
 const MOST_LAGS: usize = 112;
-/// What windows with lag 0 cost on top, in prices of a parameter, and those that begin after the first lags: of so many one is
-/// good by chance.
+/// What windows with lag 0 cost on top, in prices of a parameter, and those that begin late: of so many one is good by chance.
 const AT_ONCE: f64 = 1.0;
 const LATE: f64 = 2.0;
 /// What stands for the MDL of a model that leaves nothing, which is not defined.
@@ -145,10 +141,11 @@ impl Long {
         let count = self.rows.count() as f64;
         let price = match window.start {
             _ if window.is_empty() => 0.0,
-            0 => AT_ONCE * count.ln(),
-            nk => 2.0 * (nk as f64).ln() + if nk > self.lags { LATE * count.ln() } else { 0.0 },
+            0 => AT_ONCE,
+            late if late > self.lags => LATE,
+            _ => 0.0,
         };
-        mdl + price / count
+        mdl + price * count.ln() / count
     }
 
     /// The window of the least price, the first of equal ones.

@@ -90,12 +90,8 @@ fn the_confidence_is_the_posterior_weight_of_the_delay() {
         let target = DVector::from_column_slice(&y[4..]);
         let theta = (x.transpose() * &x).try_inverse().unwrap() * (x.transpose() * &target);
         let mdl = ((target - x * theta).norm_squared() / 36.0).ln() + lags as f64 * 36.0_f64.ln() / 36.0;
-        // Lag 0 costs one more ln(N)/N, a delay of nk > 0 costs 2 ln(nk)/N.
-        let prior = match start {
-            0 if end > 0 => 1.0 / 6.0,
-            nk => 1.0 / nk.max(1) as f64,
-        };
-        let weight = (-18.0 * mdl).exp() * prior;
+        // Lag 0 costs one more ln(N)/N.
+        let weight = (-18.0 * mdl).exp() * if start == 0 && end > 0 { 1.0 / 6.0 } else { 1.0 };
         all += weight;
         own += if start == found[0].nk && end > 0 { weight } else { 0.0 };
     }

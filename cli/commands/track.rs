@@ -11,7 +11,6 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use thetahat::Document;
-use thetahat::model::Model;
 use thetahat::report::Report;
 
 use super::{stored, summary};
@@ -35,7 +34,8 @@ pub(crate) fn track(arguments: &TrackArguments) -> Result<(), Failure> {
     let job = TrackJob::resolve(arguments)?;
     let report = job.warm.as_deref().map(stored::report).transpose()?;
     if let (Some(path), Some(report)) = (&job.warm, &report)
-        && !matches!(report.model, Model::NonlinearArx(_) | Model::StateSpace(_))
+        && report.model.as_nonlinear_arx().is_none()
+        && report.model.as_state_space().is_none()
     {
         stored::polynomials(path, &report.model, "a tracker")?;
     }

@@ -21,7 +21,7 @@ pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure>
 
 /// The settings for a model, which messages name by a path.
 pub(crate) fn settings(arguments: &TuneArguments, model: &Model, name: &Path) -> Result<Tuning, Failure> {
-    let Model::Process(process) = model else {
+    let Some(process) = model.as_process() else {
         return Err(Failure::data(format!(
             "{}: it is {}, and settings are of a process: fit one (--structure p1d)",
             name.display(),

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use thetahat::estimate::{Coupling, Procedure};
+use thetahat::estimate::Coupling;
 use thetahat::model::{Map, Model, Orders, Signal};
 use thetahat::report::Report;
 use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
@@ -192,10 +192,9 @@ impl TrackJob {
                 Source::Nothing(orders, map.map_err(|error| Failure::option(&error))?)
             }
         };
-        let noise = match (&source, model) {
-            (Source::Nothing(orders, _), _) => orders.nc,
-            (Source::Report(_), Some(Model::Polynomial(model))) => model.orders.nc,
-            (Source::Report(_), _) => 0,
+        let noise = match &source {
+            Source::Nothing(orders, _) => orders.nc,
+            Source::Report(report) => report.model.as_polynomial().map_or(0, |model| model.orders.nc),
         };
         let method = match self.method {
             Some(method) => method,
@@ -322,10 +321,7 @@ impl TrackJob {
 
 /// Which past outputs each output of a stored ARX model depends on; none of other models.
 fn coupling_of(report: &Report) -> Option<Coupling> {
-    match &report.estimation.procedure {
-        Procedure::VectorArx(outcome) => Some(outcome.coupling),
-        _ => None,
-    }
+    report.estimation.procedure.vector_arx().map(|outcome| outcome.coupling)
 }
 
 /// Which past outputs each depends on, as it is written.

@@ -8,7 +8,6 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::data::Channel;
-use thetahat::estimate::Procedure;
 use thetahat::export::{Plan, export};
 use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
@@ -170,13 +169,8 @@ impl Model {
     /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
     fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         let known = self.pending.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        let waits = |report: &Report| {
-            report.selection.is_none()
-                && !matches!(
-                    report.estimation.procedure,
-                    Procedure::PredictionError(_) | Procedure::Robust(_) | Procedure::ExactLikelihood(_)
-                )
-        };
+        let waits =
+            |report: &Report| report.selection.is_none() && report.estimation.procedure.search().is_none();
         let stored;
         let report = match &known {
             Some((pending, _)) if waits(pending.report()) => pending.report(),
@@ -439,9 +433,9 @@ impl Model {
 
     /// F, G, H, D and K of the innovations form.
     fn state_space<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 5]> {
-        let StateSpace { f, g, h, d, k, .. } = match &*self.model {
-            thetahat::model::Model::StateSpace(model) => model.matrices(),
-            _ => self.polynomials(py, "the innovations form")?.state_space(),
+        let StateSpace { f, g, h, d, k, .. } = match self.model.as_state_space() {
+            Some(model) => model.matrices(),
+            None => self.polynomials(py, "the innovations form")?.state_space(),
         };
         let array = |matrix| from_matrix(py, matrix);
         Ok([array(&f)?, array(&g)?, array(&h)?, array(&d)?, array(&k)?])
@@ -479,7 +473,7 @@ impl Model {
                 models.len()
             )));
         };
-        if own.inputs().is_empty() && matches!(*self.model, thetahat::model::Model::Equations(_)) {
+        if own.inputs().is_empty() && !self.model.has_offsets() {
             return Err(PyValueError::new_err(format!("{what} needs inputs, and the model has none")));
         }
         Ok(())

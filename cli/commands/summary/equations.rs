@@ -1,6 +1,5 @@
 //! What a fit of a model in equations found, as a table for people.
 
-use thetahat::estimate::Procedure;
 use thetahat::figures::{error, number, scientific, seconds, short};
 use thetahat::model::EquationsModel;
 use thetahat::report::Report;
@@ -25,9 +24,7 @@ pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> St
         listed(model.states.clone())
     ));
     text.line("");
-    let Procedure::InnovationsLikelihood(outcome) = &report.estimation.procedure else {
-        return text.finish();
-    };
+    let Some(outcome) = report.estimation.procedure.equations() else { return text.finish() };
     let head = ["parameter", "value", "standard error", "start", "estimated as"];
     let mut parameters = columns(&head).words(&[4]);
     for (parameter, known) in model.parameters.iter().zip(&outcome.unknown) {

@@ -1,6 +1,5 @@
 //! What a fit of a process found, as a table for people.
 
-use thetahat::estimate::Procedure;
 use thetahat::figures::{error, number, seconds, unit_of};
 use thetahat::model::ProcessModel;
 use thetahat::report::Report;
@@ -23,11 +22,9 @@ pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> Stri
     let signals: Vec<String> = signals.chain([signal("output", &model.output)]).collect();
     text.line(&signals.join(", "));
     text.line("");
-    let (outcome, of_points) = match &report.estimation.procedure {
-        Procedure::FreeRun(outcome) => (outcome, false),
-        Procedure::FrequencyResponse(outcome) => (outcome, true),
-        _ => return text.finish(),
-    };
+    let procedure = &report.estimation.procedure;
+    let Some(outcome) = procedure.process() else { return text.finish() };
+    let of_points = procedure.frequency_response().is_some();
     let plain = if of_points { "by the points alone" } else { "if errors were white" };
     let head = ["parameter", "value", "unit", "standard error", plain];
     let mut parameters = columns(&head).words(&[2]).none(NO_ERROR);

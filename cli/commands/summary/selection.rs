@@ -1,7 +1,6 @@
 //! How a model was chosen, for people.
 
 use thetahat::figures::{fixed, number};
-use thetahat::model::Model;
 use thetahat::report::Report;
 use thetahat::select::{Candidate, Select, Selection};
 
@@ -40,7 +39,7 @@ pub(super) fn selection(text: &mut Text, report: &Report) {
     let shown: Vec<&Candidate> = chosen.chain(others).take(SHOWN).collect();
     for (position, scored) in shown.iter().enumerate() {
         let role = match &selection.least {
-            _ if position == 0 && !matches!(report.model, Model::Polynomial(_)) => "polynomial",
+            _ if position == 0 && report.model.as_polynomial().is_none() => "polynomial",
             _ if position == 0 => "chosen",
             Some(least) if least.orders == scored.orders => "least",
             _ if selection.second.as_ref().is_some_and(|second| second.orders == scored.orders) => "second",

@@ -1,6 +1,6 @@
 //! What a fit of a state-space model found, as a table for people.
 
-use thetahat::estimate::{Coupling, Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
+use thetahat::estimate::{Coupling, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
 use thetahat::figures::{fixed, number, of_unit, seconds, three};
 use thetahat::model::{Quantity, Signal, StateSpaceModel};
 use thetahat::report::Report;
@@ -28,13 +28,14 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
     if report.selection.is_some() {
         selection(&mut text, report);
     }
-    let equation = match &report.estimation.procedure {
-        Procedure::VectorArx(_) => "A(q) y = B(q) u + e, as x(t+1) = F x + G u + K e, y = H x + D u + e",
-        _ => EQUATION,
+    let procedure = &report.estimation.procedure;
+    let equation = match procedure.vector_arx() {
+        Some(_) => "A(q) y = B(q) u + e, as x(t+1) = F x + G u + K e, y = H x + D u + e",
+        None => EQUATION,
     };
     head(&mut text, report, model, equation);
     let estimation = &report.estimation;
-    if let Procedure::Subspace(outcome) = &estimation.procedure {
+    if let Some(outcome) = procedure.subspace() {
         text.line(&found(outcome));
         if let Some(RefinementOutcome { errors, search }) = &outcome.refinement {
             text.line(&format!(
@@ -46,7 +47,7 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
         text.line("");
         states(&mut text, outcome, model.order());
     }
-    if let Procedure::VectorArx(outcome) = &estimation.procedure {
+    if let Some(outcome) = procedure.vector_arx() {
         text.line(&orders(outcome));
         text.line("");
         coefficients(&mut text, outcome, model);

@@ -52,6 +52,7 @@ mod plant_first;
 mod polynomials;
 mod prediction_error;
 mod predictor;
+mod procedure;
 mod process;
 mod refinement;
 mod reflection;
@@ -67,9 +68,7 @@ mod vector_arx;
 
 use std::ops::ControlFlow;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use thetahat_numerics::optimize::{Monitor, Search, Stopped};
+use thetahat_numerics::optimize::{Monitor, Search};
 
 use crate::Error;
 use crate::data::Record;
@@ -95,6 +94,8 @@ pub use outcome::{ProgramsOutcome, SearchOutcome, StartOutcome};
 pub(crate) use plant_first::noise_order;
 pub(crate) use polynomials::extended;
 pub(crate) use prediction_error::drop_is_not_for_f;
+pub(crate) use procedure::NullDistribution;
+pub use procedure::Procedure;
 pub use process::ProcessOutcome;
 pub(crate) use process::{
     Background, FreeRun, ProcessEstimate, ResponsePoints, least_free_run, least_free_run_from,
@@ -113,76 +114,6 @@ pub use thetahat_numerics::regression::Solver;
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
 pub(crate) use vector_arx::{VectorArxEstimate, vector_arx, vector_arx_of_sums};
-
-/// How an estimate was found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "method", rename_all = "kebab-case")]
-pub enum Procedure {
-    /// In one step, as the predictor is linear in the parameters.
-    LeastSquares {
-        /// How the least-squares problem was solved.
-        solver: Solver,
-    },
-    /// By instrumental variables in four stages: A and B, whatever the colour of the noise.
-    InstrumentalVariables {
-        /// The order of the autoregression that the signals of the last stage are filtered by.
-        filter_order: usize,
-        /// The order of the autoregression of the residuals that the covariance rests on.
-        residual_order: usize,
-    },
-    /// By refined instrumental variables: B and F, whatever the colour of the noise.
-    RefinedInstrumentalVariables {
-        /// Iterations done, from the best start.
-        iterations: usize,
-        /// Why they stopped.
-        stopped: Stopped,
-        /// The initial conditions that were estimated.
-        initial_conditions: usize,
-        /// The order of the autoregression of the residuals that the covariance rests on.
-        residual_order: usize,
-    },
-    /// By a search for the least sum of squared prediction errors.
-    PredictionError(SearchOutcome),
-    /// By regularised least squares, with the kernel of the largest marginal likelihood.
-    Regularised(RegularisedOutcome),
-    /// By convex optimization.
-    Constrained(ConvexOutcome),
-    /// By a search for the least sum of a loss that does not follow wild samples.
-    Robust(RobustOutcome),
-    /// By a search for the largest likelihood of all measured outputs.
-    ExactLikelihood(LikelihoodOutcome),
-    /// The largest likelihood of the innovations of a model in equations.
-    InnovationsLikelihood(EquationsOutcome),
-    /// In one step for functions of the regressors, which were chosen one after the other.
-    ForwardRegression(MapsOutcome),
-    /// In one step for local models, whose boxes were split one after the other.
-    Splits(MapsOutcome),
-    /// By the samples themselves.
-    Neighbours(MapsOutcome),
-    /// By a search for all numbers of a map, from several starts.
-    Training(MapsOutcome),
-    /// By a search for the least errors of the free run of a process in continuous time.
-    FreeRun(ProcessOutcome),
-    /// By a search for the least errors of the frequency response of a process.
-    FrequencyResponse(ProcessOutcome),
-    /// By a subspace method: the states first, then the matrices.
-    Subspace(SubspaceOutcome),
-    /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
-    VectorArx(VectorArxOutcome),
-}
-
-impl Procedure {
-    /// The choices of the functions of a nonlinear ARX model, one for each output; none of other models.
-    pub fn terms(&self) -> &[TermsOutcome] {
-        match self {
-            Self::ForwardRegression(outcome)
-            | Self::Splits(outcome)
-            | Self::Neighbours(outcome)
-            | Self::Training(outcome) => &outcome.maps,
-            _ => &[],
-        }
-    }
-}
 
 /// How to estimate.
 #[derive(Debug, Clone, PartialEq)]
@@ -449,10 +380,7 @@ impl Estimate {
 
     /// The mean of e^2 of an estimate of least squared errors that has the same likelihood, in which every f is 1.
     pub(crate) fn cost(&self) -> f64 {
-        match &self.procedure {
-            Procedure::ExactLikelihood(outcome) => outcome.cost().unwrap_or(self.mse),
-            _ => self.mse,
-        }
+        self.procedure.exact_likelihood().and_then(LikelihoodOutcome::cost).unwrap_or(self.mse)
     }
 
     /// The condition number of psi, its columns scaled to unit norm; none where they are dependent.
@@ -502,10 +430,9 @@ impl Estimate {
     /// Those of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and the others alike.
     pub fn criteria(&self) -> Criteria {
         // Those that a prior holds are no more free.
-        let parameters = match &self.procedure {
-            Procedure::Regularised(outcome) => outcome.effective_parameters.round() as usize,
-            _ => self.parameters.len(),
-        };
+        let effective =
+            self.procedure.regularised().map(|outcome| outcome.effective_parameters.round() as usize);
+        let parameters = effective.unwrap_or(self.parameters.len());
         Criteria::new(self.cost(), parameters, self.samples)
     }
 }

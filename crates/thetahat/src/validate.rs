@@ -42,6 +42,5 @@ pub use fit::{Fit, Part};
 pub use nonlinear::Nonlinearity;
 pub(crate) use nonlinear::nonlinearities;
 pub(crate) use portmanteau::portmanteau;
-pub(crate) use residuals::Relation;
 pub use residuals::Residuals;
 pub use verdict::{Anderson, AndersonLevel, Independence, Test};

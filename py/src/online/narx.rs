@@ -3,7 +3,7 @@
 use numpy::PyArray1;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use thetahat::model::{Functions, Map, Model as KindOfModel, Signal};
+use thetahat::model::{Functions, Map, Signal};
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_core::{ArxOrders, Covariance, InputOrders, Scaling};
 
@@ -207,7 +207,7 @@ impl RecursiveNarx {
         };
         let report = fitted.get().report(py)?;
         let refuse = |what: &str| PyValueError::new_err(format!("model: {what}"));
-        let KindOfModel::NonlinearArx(own) = &report.model else {
+        let Some(own) = report.model.as_nonlinear_arx() else {
             return Err(refuse("expected a nonlinear ARX model"));
         };
         let lags = own.lag_orders().map_err(|error| error::batch(py, error))?;

@@ -53,7 +53,7 @@ use crate::model::{OffsetCovariance, Orders, Quantity, Structure};
 pub(crate) use beside::Beside;
 pub(crate) use normal_equations::LinearProblem;
 pub(crate) use worth::pays;
-use worth::{OfConstant, conditions, is_worth, lowers_mdl, white_samples};
+use worth::{OfConstant, is_worth, lowers_mdl, white_samples};
 
 /// A search for a constant begins where a step predicts this fraction of what it must be worth.
 const PROMISING: f64 = 0.5;
@@ -380,7 +380,7 @@ impl<D: ExperimentData> Task<'_, D> {
         let data = self.data.with_inputs(&signals);
         let orders = self.orders.with_constants(beside.count());
         let parameters = beside.with_zeros(self.orders, without.parameters());
-        let known = conditions(without) as f64;
+        let known = without.procedure().initial_conditions() as f64;
         let from = |begin| {
             let mut predictor = data.errors(&orders, begin);
             if begin == InitialCondition::Unknown && known > predictor.initial_conditions() as f64 {

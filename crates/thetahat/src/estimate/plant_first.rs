@@ -69,7 +69,7 @@ pub(super) fn plant_first(
     let (errors, segments) =
         if orders.na > 0 { filtered(&v, &segments, &polynomials.a) } else { (v, segments) };
     let noise = Orders::new(orders.nd, &[], orders.nc, 0, &[], &[]);
-    let unknown = first.parameters().len() + conditions(&first);
+    let unknown = first.parameters().len() + first.procedure().initial_conditions();
     let (samples, cost, noise) = match noise {
         Ok(noise) => {
             let past = vec![0; segments.len()];
@@ -219,13 +219,6 @@ fn filtered(v: &[f64], segments: &[Range<usize>], a: &[f64]) -> (Vec<f64>, Vec<R
     });
     let segments = segments.collect();
     (errors, segments)
-}
-
-fn conditions(estimate: &Estimate) -> usize {
-    match estimate.procedure() {
-        Procedure::PredictionError(outcome) => outcome.initial_conditions,
-        _ => 0,
-    }
 }
 
 /// The covariance of all parameters from those of plant and noise; those of the plant stand at `places` among them.

@@ -479,12 +479,7 @@ pub(super) fn predictor_of<'d, D: ExperimentData>(
     let begin =
         if estimate.initial() == Initial::Zero { InitialCondition::Zero } else { InitialCondition::Unknown };
     let predictor = data.errors(orders, begin);
-    let conditions = match estimate.procedure() {
-        Procedure::PredictionError(outcome) => outcome.initial_conditions,
-        Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
-        _ => 0,
-    };
-    if conditions > predictor.initial_conditions() {
+    if estimate.procedure().initial_conditions() > predictor.initial_conditions() {
         return data.errors(orders, InitialCondition::UnknownInputs);
     }
     predictor

@@ -1,5 +1,7 @@
 //! The kinds of models.
 
+use std::borrow::Cow;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,8 +9,10 @@ use super::equations::EquationsModel;
 use super::fitted::{Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
+use super::orders::Structure;
 use super::process::ProcessModel;
-use super::state_space::{ContinuousStateSpaceModel, StateSpaceModel};
+use super::quantity::Quantity;
+use super::state_space::{ContinuousStateSpaceModel, Hold, StateSpace, StateSpaceModel};
 use crate::Error;
 
 /// An estimated model of any kind.
@@ -127,7 +131,9 @@ impl Model {
         match self {
             Self::StateSpace(model) => model.free_parameters,
             Self::ContinuousStateSpace(model) => model.free_parameters,
-            _ => self.parameters().len(),
+            Self::Polynomial(_) | Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) => {
+                self.parameters().len()
+            }
         }
     }
 
@@ -142,6 +148,17 @@ impl Model {
         }
     }
 
+    /// Whether it is known how certain its numbers are.
+    pub(crate) fn has_standard_errors(&self) -> bool {
+        match self {
+            Self::StateSpace(model) => model.covariance.is_some(),
+            Self::ContinuousStateSpace(model) => model.covariance.is_some(),
+            Self::Polynomial(_) | Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) => {
+                self.covariance().is_some()
+            }
+        }
+    }
+
     /// Whether inputs act on the outputs.
     pub fn is_driven(&self) -> bool {
         match self {
@@ -151,6 +168,178 @@ impl Model {
             Self::Process(_) => true,
             Self::StateSpace(model) => !model.inputs.is_empty(),
             Self::ContinuousStateSpace(model) => !model.inputs.is_empty(),
+        }
+    }
+
+    /// Whether all of its poles are inside the unit circle, or in the left half plane; none of models that say nothing of it.
+    pub fn stability(&self) -> Option<bool> {
+        match self {
+            Self::Polynomial(model) => Some(model.stable),
+            Self::StateSpace(model) => Some(model.stable),
+            Self::ContinuousStateSpace(model) => Some(model.stable),
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) => None,
+        }
+    }
+
+    /// The time constants of the poles of a sampled linear model; none of others.
+    pub fn time_constants(&self) -> Option<&[Option<Quantity>]> {
+        match self {
+            Self::Polynomial(model) => Some(&model.time_constants),
+            Self::StateSpace(model) => Some(&model.time_constants),
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) | Self::ContinuousStateSpace(_) => {
+                None
+            }
+        }
+    }
+
+    /// The gains of a sampled linear model for inputs that do not change, a list of the inputs' for each output; none of others.
+    pub fn static_gains(&self) -> Option<Vec<&[Option<Quantity>]>> {
+        match self {
+            Self::Polynomial(model) => Some(vec![&model.dc_gain]),
+            Self::StateSpace(model) => Some(model.dc_gain.iter().map(Vec::as_slice).collect()),
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) | Self::ContinuousStateSpace(_) => {
+                None
+            }
+        }
+    }
+
+    /// Whether it says of what colour the noise is, so that its errors one step ahead are white where it is right.
+    pub fn describes_noise(&self) -> bool {
+        match self {
+            Self::Polynomial(model) => model.structure != Structure::Oe,
+            Self::Process(_) => false,
+            Self::Equations(_)
+            | Self::NonlinearArx(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => true,
+        }
+    }
+
+    /// How many parameters of the noise take correlations from the errors of several outputs: F and K of a canonical form.
+    pub(crate) fn noise_parameters(&self) -> usize {
+        match self {
+            Self::StateSpace(model) => 2 * model.order() * model.outputs.len(),
+            Self::Polynomial(_)
+            | Self::Equations(_)
+            | Self::NonlinearArx(_)
+            | Self::Process(_)
+            | Self::ContinuousStateSpace(_) => 0,
+        }
+    }
+
+    /// Whether it expects errors of one size in all rows. Equations may not, and then the sizes depend on the inputs.
+    pub(crate) fn expects_errors_of_one_size(&self) -> bool {
+        !matches!(self, Self::Equations(_))
+    }
+
+    /// Whether it knows the plant in the range of the rows alone that it was fitted to.
+    pub(crate) fn ends_with_its_range(&self) -> bool {
+        matches!(self, Self::NonlinearArx(_))
+    }
+
+    /// Whether it describes deviations from offsets. Equations describe signals as they are.
+    pub fn has_offsets(&self) -> bool {
+        !matches!(self, Self::Equations(_))
+    }
+
+    /// The model beside offsets that were found elsewhere: of its own it says nothing.
+    pub(crate) fn without_own_offsets(&self) -> Cow<'_, Self> {
+        match self {
+            Self::Polynomial(model) => {
+                Cow::Owned(PolynomialModel { offset_covariance: None, ..(**model).clone() }.into())
+            }
+            Self::Process(model) => {
+                Cow::Owned(ProcessModel { offset_covariance: None, ..(**model).clone() }.into())
+            }
+            Self::Equations(_)
+            | Self::NonlinearArx(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => Cow::Borrowed(self),
+        }
+    }
+
+    /// By how much the sum of squared errors was divided to give the noise variance; none where that is not known.
+    pub(crate) fn degrees_of_freedom(&self) -> Option<usize> {
+        match self {
+            Self::Polynomial(model) => model.degrees_of_freedom,
+            Self::StateSpace(model) => model.degrees_of_freedom,
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) | Self::ContinuousStateSpace(_) => {
+                None
+            }
+        }
+    }
+
+    /// The recursion x(t+1) = F x + G u + K e, y = H x + D u + e of a sampled linear model.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for others, which have none.
+    pub fn innovations_form(&self) -> Result<StateSpace, Error> {
+        match self {
+            Self::Polynomial(model) => Ok(model.state_space()),
+            Self::StateSpace(model) => Ok(model.matrices()),
+            Self::ContinuousStateSpace(_) => Err(Error::argument(
+                "model",
+                "states are left out of sampled models, and this one is in continuous time: convert it to a sample time first",
+            )),
+            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) => Err(Error::argument(
+                "model",
+                format!(
+                    "states are left out of models in state space and of polynomials, and this one is {}",
+                    self.name()
+                ),
+            )),
+        }
+    }
+
+    /// How inputs go on between samples, of what is in continuous time and says it.
+    pub(crate) fn own_hold(&self) -> Option<Hold> {
+        match self {
+            Self::ContinuousStateSpace(model) => Some(model.hold),
+            Self::Polynomial(_)
+            | Self::Equations(_)
+            | Self::NonlinearArx(_)
+            | Self::Process(_)
+            | Self::StateSpace(_) => None,
+        }
+    }
+
+    /// Whether it is in continuous time, whatever the sample time of its log.
+    pub fn is_continuous(&self) -> bool {
+        match self {
+            Self::Process(_) | Self::ContinuousStateSpace(_) => true,
+            Self::Polynomial(_) | Self::Equations(_) | Self::NonlinearArx(_) | Self::StateSpace(_) => false,
+        }
+    }
+
+    /// The polynomials, if it is of these.
+    pub fn as_polynomial(&self) -> Option<&PolynomialModel> {
+        if let Self::Polynomial(model) = self { Some(model) } else { None }
+    }
+
+    /// The process, if it is one.
+    pub fn as_process(&self) -> Option<&ProcessModel> {
+        if let Self::Process(model) = self { Some(model) } else { None }
+    }
+
+    /// The model in state space, if it is one and sampled.
+    pub fn as_state_space(&self) -> Option<&StateSpaceModel> {
+        if let Self::StateSpace(model) = self { Some(model) } else { None }
+    }
+
+    /// The nonlinear ARX model, if it is one.
+    pub fn as_nonlinear_arx(&self) -> Option<&NonlinearArxModel> {
+        if let Self::NonlinearArx(model) = self { Some(model) } else { None }
+    }
+
+    /// What it is called, with the equation where that is short.
+    pub(crate) fn headline(&self) -> String {
+        match self {
+            Self::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
+            Self::Equations(_)
+            | Self::NonlinearArx(_)
+            | Self::Process(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => self.name(),
         }
     }
 

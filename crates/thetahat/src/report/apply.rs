@@ -5,7 +5,7 @@ use super::schema::Report;
 use super::suited::{check_offsets, check_sample_time};
 use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, checked};
-use crate::model::{Model, PolynomialModel, ProcessModel};
+use crate::model::Model;
 use crate::respond::{Horizon, InitialCondition, Response};
 use crate::validate::Fit;
 
@@ -160,17 +160,9 @@ fn applied(
     Ok(Applied { outputs, beyond, rows, clamped })
 }
 
-/// The model as it is beside offsets that are its own, or that were found elsewhere: of those it says nothing.
+/// The model as it is beside offsets that are its own, or that were found elsewhere.
 pub(super) fn of_offsets(model: &Model, detrend: Option<Detrend>) -> Cow<'_, Model> {
-    match (model, detrend) {
-        (Model::Polynomial(model), Some(_)) => {
-            Cow::Owned(PolynomialModel { offset_covariance: None, ..(**model).clone() }.into())
-        }
-        (Model::Process(model), Some(_)) => {
-            Cow::Owned(ProcessModel { offset_covariance: None, ..(**model).clone() }.into())
-        }
-        _ => Cow::Borrowed(model),
-    }
+    if detrend.is_some() { model.without_own_offsets() } else { Cow::Borrowed(model) }
 }
 
 /// A log of which the offsets were taken.

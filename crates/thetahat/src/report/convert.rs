@@ -37,11 +37,7 @@ impl Report {
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn converted(&self, to: TimeBase, hold: Option<Hold>) -> Result<Self, Error> {
-        let own = match &self.model {
-            Model::ContinuousStateSpace(model) => Some(model.hold),
-            _ => None,
-        };
-        let hold = hold.or(own).unwrap_or_default();
+        let hold = hold.or(self.model.own_hold()).unwrap_or_default();
         let model: Model = match to {
             TimeBase::Continuous => self.model.to_continuous(hold)?.into(),
             TimeBase::Sampled(seconds) => self.model.at_sample_time(seconds, Some(hold))?.into(),
@@ -51,18 +47,13 @@ impl Report {
             Self { model, fit: Vec::new(), purpose: String::new(), selection: None, ..self.clone() };
         // They were those of another model.
         report.estimation.criteria = Criteria::new(f64::NAN, free, report.estimation.samples);
-        let from = match &self.model {
-            Model::Process(_) | Model::ContinuousStateSpace(_) => TimeBase::Continuous,
-            model => TimeBase::Sampled(model.sample_time()),
+        let from = match self.model.is_continuous() {
+            true => TimeBase::Continuous,
+            false => TimeBase::Sampled(self.model.sample_time()),
         };
-        let known = match &report.model {
-            Model::ContinuousStateSpace(model) => model.covariance.is_some(),
-            Model::StateSpace(model) => model.covariance.is_some(),
-            _ => false,
-        };
-        let errors = if known { "" } else { " and no standard errors" };
-        let how = match (&self.model, to) {
-            (Model::Process(_), TimeBase::Continuous) => "the process was put into state space".to_owned(),
+        let errors = if report.model.has_standard_errors() { "" } else { " and no standard errors" };
+        let how = match (self.model.as_process(), to) {
+            (Some(_), TimeBase::Continuous) => "the process was put into state space".to_owned(),
             _ => format!("the model was converted from {from} to {to} with {hold}"),
         };
         report.warnings = vec![format!("{how}: it has no figures of a fit{errors}")];

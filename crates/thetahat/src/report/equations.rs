@@ -12,7 +12,8 @@ use super::schema::{Estimation, Report};
 use super::shares::Shares;
 use crate::data::{Log, Rows, Source, Split};
 use crate::estimate::{
-    Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, Procedure, Question,
+    Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, NullDistribution, Procedure,
+    Question,
     equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
 };
 use crate::model::{EquationsModel, GreyBox, Model};
@@ -21,7 +22,7 @@ use crate::respond::{
     equations::{EquationsOnLog, Experiment, Predictor, experiments, walk},
 };
 use crate::select::Focus;
-use crate::validate::{Part, Relation, Residuals};
+use crate::validate::{Part, Residuals};
 use crate::{Document, Error};
 
 /// Lags of the test of whiteness that a fit warns by, and its levels.
@@ -241,15 +242,7 @@ fn fit(
     let mut words = warnings::of_inputs(model, &fitted_to, log.rows());
     words.extend(warnings::of_fit(&fitted, &estimation, &walking));
     words.extend(warnings::of_colour(&own, |tested| {
-        let residuals = Residuals::of(
-            &tested.model,
-            &tested.record,
-            &tested.innovations,
-            Relation::Fresh,
-            LAGS,
-            &[LEVEL],
-            LEVEL,
-        );
+        let residuals = Residuals::of(tested, NullDistribution::Known, LAGS, &[LEVEL], LEVEL);
         residuals.ok().map(|residuals| residuals.ljung_box)
     }));
     let mut report = Report {

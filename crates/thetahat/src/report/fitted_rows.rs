@@ -3,7 +3,7 @@
 use super::schema::Report;
 use crate::Error;
 use crate::data::{Log, Record, Rows, digest, inside};
-use crate::estimate::{Initial, Procedure};
+use crate::estimate::Initial;
 use crate::model::{Orders, PolynomialModel};
 use crate::respond::{Horizon, InitialCondition};
 
@@ -27,11 +27,7 @@ pub(super) fn estimation_record<'l>(
     inputs: &[String],
 ) -> Result<Record<'l>, Error> {
     let (output, rows) = (&model.output.name, &report.data.estimation);
-    let by_instruments = matches!(
-        report.estimation.procedure,
-        Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
-    );
-    if by_instruments {
+    if report.estimation.procedure.is_instrumental() {
         // They begin with their segments.
         let record = log.record(inputs, output, rows)?;
         return Ok(Record { past: vec![0; record.segments.len()], ..record });
@@ -50,7 +46,7 @@ pub(super) fn goes_through(orders: &Orders, initial: Initial) -> bool {
 
 /// Whether the estimate is that of largest exact likelihood.
 pub(super) fn is_exact(report: &Report) -> bool {
-    matches!(report.estimation.procedure, Procedure::ExactLikelihood(_))
+    report.estimation.procedure.exact_likelihood().is_some()
 }
 
 /// The rows of this log that the model was fitted to, by their digests.

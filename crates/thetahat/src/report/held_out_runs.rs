@@ -11,7 +11,7 @@ use super::validation::{Validated, ValidationPlan, validate};
 use crate::Error;
 use crate::data::{Detrend, Log, Rows, between};
 use crate::estimate::Constant;
-use crate::model::Model;
+use crate::model::StateSpaceModel;
 use crate::respond::Horizon;
 
 /// The rows that a choice was made on are cut into this many parts, of which the last is held out.
@@ -29,8 +29,8 @@ pub fn held_out_runs(report: &Report, log: &Log) -> Result<Vec<(String, Validate
     let Some(selection) = &report.selection else { return Ok(Vec::new()) };
     let Some(winners) = &selection.winners else { return Ok(Vec::new()) };
     let (prediction, simulation) = (&winners.prediction.orders, &winners.simulation.orders);
-    let process = if let Model::Process(model) = &report.model { Some(model) } else { None };
-    let order = if let Model::StateSpace(model) = &report.model { Some(model.order()) } else { None };
+    let process = report.model.as_process();
+    let order = report.model.as_state_space().map(StateSpaceModel::order);
     let alone = process.is_none() && order.is_none();
     if selection.focus.horizon() != Horizon::FreeRun || (prediction == simulation && alone) {
         return Ok(Vec::new());

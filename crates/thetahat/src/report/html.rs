@@ -27,7 +27,6 @@ pub use tuning::tuning_page;
 use super::{Report, Validated, Validation};
 use crate::Error;
 use crate::data::{Finding, FindingKind, Rows, Source};
-use crate::estimate::Procedure;
 use crate::figures::{self, fixed};
 use crate::inspect::Inspection;
 use crate::model::{
@@ -156,7 +155,7 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     let mut page = Page::new(format!("Comparison of {} models{}", names.len(), of(logs)), command, generator);
     let named: Vec<(String, &Validated)> = names.iter().cloned().zip(validated).collect();
     let each = || names.iter().zip(reports);
-    page.lead = each().map(|(name, report)| format!("{name} is {}", headline(&report.model))).collect();
+    page.lead = each().map(|(name, report)| format!("{name} is {}", report.model.headline())).collect();
     let several = reports.iter().any(|report| report.model.outputs().len() > 1);
     let mut linear: Vec<(String, LinearModel<'_>)> = Vec::new();
     for (name, report) in each() {
@@ -319,29 +318,12 @@ fn of(logs: &[Source]) -> String {
     }
 }
 
-fn headline(model: &Model) -> String {
-    match model {
-        Model::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
-        Model::Equations(_)
-        | Model::NonlinearArx(_)
-        | Model::Process(_)
-        | Model::StateSpace(_)
-        | Model::ContinuousStateSpace(_) => model.name(),
-    }
-}
-
 /// The model in a sentence, and how close it comes.
 fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
-    let stable = match model {
-        Model::Polynomial(model) => Some(model.stable),
-        Model::StateSpace(model) => Some(model.stable),
-        Model::ContinuousStateSpace(model) => Some(model.stable),
-        _ => None,
-    };
-    let stable = stable.map_or("", |stable| if stable { ", stable" } else { ", unstable" });
+    let stable = model.stability().map_or("", |stable| if stable { ", stable" } else { ", unstable" });
     let several = model.outputs().len() > 1;
     let mut lead = vec![
-        format!("{}.", headline(model)),
+        format!("{}.", model.headline()),
         format!(
             "Sample time {} s, {} parameters{stable}.",
             figures::short(model.sample_time()),
@@ -565,7 +547,7 @@ fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
         linear.iter().map(|model| (format!("to {}", model.output().name), model)).collect();
     let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
     let mut sections = Vec::new();
-    if let Procedure::Subspace(outcome) = &report.estimation.procedure {
+    if let Some(outcome) = report.estimation.procedure.subspace() {
         let mut section = Section::new("Order");
         section.chart(charts::singular_values(outcome, model.order()));
         if !outcome.orders.is_empty() {
@@ -581,7 +563,7 @@ fn of_state_space(report: &Report, model: &StateSpaceModel) -> Vec<Section> {
     let mut section = Section::new("Model");
     section.table(tables::signals_and_gains(model));
     // Of a model that was made of another one they are none of its own.
-    if let (Procedure::VectorArx(outcome), false) = (&report.estimation.procedure, report.fit.is_empty()) {
+    if let (Some(outcome), false) = (report.estimation.procedure.vector_arx(), report.fit.is_empty()) {
         section.table(tables::matrix_coefficients(outcome, model));
     }
     section.table(tables::noise_of_outputs(model));

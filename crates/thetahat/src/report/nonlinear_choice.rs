@@ -9,7 +9,7 @@ use super::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
 use crate::Error;
 use crate::data::{Log, Rows, Source};
 use crate::estimate::{MapsOutcome, Method, Procedure, RunFigures, TermStep};
-use crate::model::{Activation, Model};
+use crate::model::Activation;
 use crate::report::shares::Shares;
 use crate::report::{Plan, Report, apply, identify_monitored};
 use crate::respond::nonlinear_arx::within;
@@ -186,13 +186,7 @@ fn best(
                 Some(_) => fit_planned(log, sources, &of_all_rows(own, plan), monitor)?,
                 None => report,
             };
-            let maps = match &mut report.estimation.procedure {
-                Procedure::ForwardRegression(outcome) | Procedure::Training(outcome) => {
-                    std::mem::take(&mut outcome.maps)
-                }
-                _ => Vec::new(),
-            };
-            let maps = maps.into_iter().map(|mut outcome| {
+            let maps = report.estimation.procedure.terms().iter().cloned().map(|mut outcome| {
                 outcome.candidates = path.len();
                 outcome.taken = taken + 1;
                 outcome.path.clone_from(&path);
@@ -244,7 +238,7 @@ fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan
     let own = NonlinearArxPlan { lags_chosen: false, ..plan.clone() };
     let mut plans = vec![own.clone()];
     // A step test may come to a process, which has no lags.
-    if let Some(Model::Polynomial(linear)) = linear.map(|linear| &linear.report.model)
+    if let Some(linear) = linear.and_then(|linear| linear.report.model.as_polynomial())
         && plan.lags_chosen
     {
         let orders = &linear.orders;
@@ -308,7 +302,7 @@ impl Parts<'_> {
             ..plan.clone()
         };
         let report = fit_planned(self.log, self.sources, &own, self.monitor)?;
-        let (Model::NonlinearArx(model), [outcome]) = (&report.model, report.estimation.procedure.terms())
+        let (Some(model), [outcome]) = (report.model.as_nonlinear_arx(), report.estimation.procedure.terms())
         else {
             return Ok(None);
         };

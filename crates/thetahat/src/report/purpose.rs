@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use super::schema::Report;
 use crate::data::FindingKind;
 use crate::figures::{fixed, three};
-use crate::model::{LinearModel, Model, Quantity};
+use crate::model::{LinearModel, Quantity};
 use crate::respond::{Horizon, logarithmic_frequencies};
 use crate::select::HeldOut;
 use crate::validate::Part;
@@ -45,9 +45,9 @@ fn purpose(report: &Report) -> String {
     match run.or_else(|| figure(report, Horizon::FreeRun)).filter(|_| driven) {
         Some((percent, rows)) if percent >= SIMULATES => {
             let what = if drifts { "simulation of changes" } else { "simulation" };
-            let range = match report.model {
-                Model::NonlinearArx(_) => ", within the range of the rows that it was fitted to",
-                _ => "",
+            let range = match report.model.ends_with_its_range() {
+                true => ", within the range of the rows that it was fitted to",
+                false => "",
             };
             good.push(format!("{what} ({} % {rows}{range})", fixed(percent, 1)));
         }
@@ -101,10 +101,12 @@ fn figure(report: &Report, horizon: Horizon) -> Option<(f64, &'static str)> {
 /// That of free runs on blocks held out while the model was chosen.
 fn held_out(report: &Report) -> Option<(f64, &'static str)> {
     let selection = report.selection.as_ref()?;
-    let seen = match report.model {
-        Model::Polynomial(_) if selection.focus.horizon() == Horizon::FreeRun => selection.chosen.held_out,
-        Model::StateSpace(_) => selection.state_space.as_ref()?.held_out,
-        _ => None,
+    let seen = if report.model.as_state_space().is_some() {
+        selection.state_space.as_ref()?.held_out
+    } else if report.model.as_polynomial().is_some() && selection.focus.horizon() == Horizon::FreeRun {
+        selection.chosen.held_out
+    } else {
+        None
     };
     seen.as_ref().map(HeldOut::percent).map(|percent| (percent, "on held-out blocks"))
 }
@@ -171,7 +173,7 @@ fn unknown_gains(linear: &[LinearModel<'_>]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::data::{Channel, Log};
-    use crate::model::{Interval, Orders};
+    use crate::model::{Interval, Model, Orders};
     use crate::report::{Plan, identify};
 
     /// y(t) = 0.9 y(t-1) + b u(t-1) + e(t).

@@ -4,7 +4,7 @@ use super::Report;
 use crate::Error;
 use crate::estimate::Criteria;
 use crate::figures::number;
-use crate::model::{Model, Signal, StateSpace, StateSpaceModel};
+use crate::model::{Signal, StateSpaceModel};
 
 impl Report {
     /// The Hankel singular values of its model, falling: see [`StateSpace::hankel_singular_values`].
@@ -13,7 +13,7 @@ impl Report {
     /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for
     /// [`StateSpace::hankel_singular_values`].
     pub fn hankel_singular_values(&self) -> Result<Vec<f64>, Error> {
-        innovations_form(&self.model)?.hankel_singular_values()
+        self.model.innovations_form()?.hankel_singular_values()
     }
 
     /// The report with a model of so many states by balanced truncation, and a bound of what that does to the frequency response: see
@@ -44,18 +44,14 @@ impl Report {
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn reduced(&self, order: usize) -> Result<(Self, f64), Error> {
-        let space = innovations_form(&self.model)?;
+        let space = self.model.innovations_form()?;
         let states = space.f.nrows();
         let found = space.reduced(order)?;
         let own = |signals: &[Signal]| signals.to_vec();
         let (inputs, outputs) = (own(self.model.inputs()), own(self.model.outputs()));
         let (m, l) = (inputs.len(), outputs.len());
         let direct = if found.model.d.iter().any(|entry| *entry != 0.0) { l * m } else { 0 };
-        let degrees = match &self.model {
-            Model::Polynomial(model) => model.degrees_of_freedom,
-            Model::StateSpace(model) => model.degrees_of_freedom,
-            _ => None,
-        };
+        let degrees = self.model.degrees_of_freedom();
         let free = order * (m + 2 * l) + direct;
         let model = StateSpaceModel::new((inputs, outputs), vec![0; m], &found.model, free, degrees)?;
         let mut report = Self {
@@ -73,25 +69,6 @@ impl Report {
             number(found.error_bound)
         )];
         Ok((report, found.error_bound))
-    }
-}
-
-/// The recursion of a model.
-fn innovations_form(model: &Model) -> Result<StateSpace, Error> {
-    match model {
-        Model::Polynomial(model) => Ok(model.state_space()),
-        Model::StateSpace(model) => Ok(model.matrices()),
-        Model::ContinuousStateSpace(_) => Err(Error::argument(
-            "model",
-            "states are left out of sampled models, and this one is in continuous time: convert it to a sample time first",
-        )),
-        Model::Equations(_) | Model::NonlinearArx(_) | Model::Process(_) => Err(Error::argument(
-            "model",
-            format!(
-                "states are left out of models in state space and of polynomials, and this one is {}",
-                model.name()
-            ),
-        )),
     }
 }
 

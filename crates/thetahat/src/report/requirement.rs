@@ -3,9 +3,7 @@ use std::str::FromStr;
 
 use super::{Coverage, Report, Validation};
 use crate::Error;
-use crate::estimate::Procedure;
 use crate::figures::{chance, fixed, number};
-use crate::model::{Model, Structure};
 use crate::respond::Horizon;
 use crate::validate::{Fit, Residuals};
 
@@ -231,13 +229,12 @@ impl Demand {
 
     fn check(&self, report: &Report) -> Result<(), Error> {
         let refused = |message: &str| Err(Error::argument("require", message));
-        let oe = matches!(&report.model, Model::Polynomial(model) if model.structure == Structure::Oe);
-        let kind = match report.estimation.procedure {
-            Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. } => {
-                Some("fitted by instrumental variables")
-            }
-            _ if oe => Some("of output error"),
-            _ => None,
+        let kind = if report.estimation.procedure.is_instrumental() {
+            Some("fitted by instrumental variables")
+        } else if report.model.describes_noise() {
+            None
+        } else {
+            Some(if report.model.as_process().is_some() { "of a process" } else { "of output error" })
         };
         match (self, kind) {
             (Self::White, Some(kind)) => refused(&format!(
@@ -247,11 +244,7 @@ impl Demand {
             (Self::Independent, _) if !report.model.is_driven() => {
                 refused("independent: the model has no inputs; ask for white")
             }
-            (Self::Stable, _)
-                if matches!(report.model, Model::StateSpace(_) | Model::ContinuousStateSpace(_)) =>
-            {
-                Ok(())
-            }
+            (Self::Stable, _) if report.model.stability().is_some() => Ok(()),
             (Self::Stable, _) => report.model.polynomials("stable: a pole").map(|_| ()),
             _ => Ok(()),
         }

@@ -102,30 +102,17 @@ fn fits(row: &mut Row, fits: &[Fit], several: bool) {
 
 /// Whether a model is stable, its static gains and its longest time constant.
 fn dynamics(row: &mut Row, model: &Model) {
-    let (stable, constants): (_, &[Option<Quantity>]) = match model {
-        Model::Polynomial(model) => (model.stable, &model.time_constants),
-        Model::StateSpace(model) => (model.stable, &model.time_constants),
-        _ => return,
+    let (Some(stable), Some(constants), Some(gains)) =
+        (model.stability(), model.time_constants(), model.static_gains())
+    else {
+        return;
     };
     row.add("stable", crate::Cell::Flag(stable));
-    let name = |input: usize, output: usize| {
-        let gain = of("dc_gain", model.inputs().len() > 1, &model.inputs()[input].name);
-        of(&gain, model.outputs().len() > 1, &model.outputs()[output].name)
-    };
-    match model {
-        Model::Polynomial(model) => {
-            for (input, gain) in model.dc_gain.iter().enumerate() {
-                quantity(row, &name(input, 0), gain.as_ref());
-            }
+    for (gains, output) in gains.into_iter().zip(model.outputs()) {
+        for (gain, input) in gains.iter().zip(model.inputs()) {
+            let name = of("dc_gain", model.inputs().len() > 1, &input.name);
+            quantity(row, &of(&name, model.outputs().len() > 1, &output.name), gain.as_ref());
         }
-        Model::StateSpace(model) => {
-            for (output, gains) in model.dc_gain.iter().enumerate() {
-                for (input, gain) in gains.iter().enumerate() {
-                    quantity(row, &name(input, output), gain.as_ref());
-                }
-            }
-        }
-        _ => {}
     }
     let longest = constants.iter().flatten().max_by(|one, other| one.value.total_cmp(&other.value));
     quantity(row, "time_constant", longest);

@@ -13,12 +13,12 @@ use super::evaluate::of_output;
 use super::fitted_rows::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
-use crate::estimate::{Criteria, Procedure};
+use crate::estimate::{Criteria, NullDistribution};
 use crate::figures::{chance, fixed, number};
-use crate::model::{Model, Structure};
+use crate::model::Model;
 use crate::respond::{Horizon, Innovations, OnLog, Response, Tested, check_steps};
 use crate::spectrum::MeasuredResponse;
-use crate::validate::{Fit, Relation, Residuals, nonlinearities, portmanteau};
+use crate::validate::{Fit, Residuals, nonlinearities, portmanteau};
 use crate::{Document, Error};
 
 const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
@@ -226,13 +226,8 @@ pub fn validate(
     }
     let on_log = model.on_log(&deviations, &rows, None, &fitted)?;
 
-    let polynomial = if let Model::Polynomial(model) = model { Some(model) } else { None };
-    let white_expected = polynomial.is_none_or(|model| model.structure != Structure::Oe)
-        && !matches!(model, Model::Process(_))
-        && !matches!(
-            report.estimation.procedure,
-            Procedure::InstrumentalVariables { .. } | Procedure::RefinedInstrumentalVariables { .. }
-        );
+    let polynomial = model.as_polynomial();
+    let white_expected = model.describes_noise() && !report.estimation.procedure.is_instrumental();
     let mut validation = Validation {
         schema: Validation::SCHEMA.to_owned(),
         generator: GENERATOR.to_owned(),
@@ -243,12 +238,7 @@ pub fn validate(
         parameters: model.free_parameters(),
         structure: polynomial.map(|model| model.structure),
         orders: polynomial.map(|model| model.orders.clone()),
-        stable: match model {
-            Model::Polynomial(model) => Some(model.stable),
-            Model::StateSpace(model) => Some(model.stable),
-            Model::ContinuousStateSpace(model) => Some(model.stable),
-            _ => None,
-        },
+        stable: model.stability(),
         driven: on_log.is_driven(),
         white_expected,
         fit: Vec::new(),
@@ -433,43 +423,34 @@ fn coverage<'a>(
 fn test_residuals(report: &Report, on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validation) {
     // Where that fails, the fit figure has said why.
     let Ok(each) = on_log.tested() else { return };
-    let relation = match (validation.in_sample, &report.estimation.procedure) {
-        // The parameters of equations are none of the noise; those of functions are not of the model that the tests know.
-        (InSample::No, _) | (_, Procedure::InnovationsLikelihood(_)) => Relation::Fresh,
-        (_, Procedure::FreeRun(_) | Procedure::FrequencyResponse(_)) => Relation::Fresh,
-        (_, Procedure::Subspace(_) | Procedure::VectorArx(_)) => Relation::Fresh,
-        (_, procedure) if !procedure.terms().is_empty() => Relation::Fresh,
-        (_, Procedure::InstrumentalVariables { .. }) => Relation::Instrumental,
-        _ => Relation::Fitted,
+    let null = match validation.in_sample {
+        InSample::No => NullDistribution::Known,
+        InSample::Yes | InSample::Partly => report.estimation.procedure.null_distribution(),
     };
     let mut alphas = plan.alphas.clone();
     alphas.sort_unstable_by(f64::total_cmp);
     alphas.dedup();
     let together: Vec<&[Innovations]> = each.iter().map(|one| &*one.innovations).collect();
-    let fitted = match (&report.model, validation.in_sample) {
-        // F and K of a canonical form.
-        (Model::StateSpace(model), InSample::Yes) => 2 * model.order() * together.len(),
-        _ => 0,
+    let fitted = match validation.in_sample {
+        InSample::Yes => report.model.noise_parameters(),
+        InSample::No | InSample::Partly => 0,
     };
     let samples: usize =
         each.first().map_or(0, |one| one.innovations.iter().map(|own| own.counted_errors().count()).sum());
     validation.portmanteau = portmanteau(&together, plan.lags.min(samples / PORTMANTEAU), fitted);
-    for Tested { model, record, innovations } in &each {
-        match Residuals::of(model, record, innovations, relation, plan.lags, &alphas, plan.alpha) {
+    for tested in &each {
+        let Tested { output, inputs, record, innovations, .. } = tested;
+        match Residuals::of(tested, null, plan.lags, &alphas, plan.alpha) {
             Ok(residuals) => {
                 validation.residuals.push(residuals);
-                // Equations may expect errors of another size in each row, and then those depend on the inputs.
-                if !matches!(report.model, Model::Equations(_)) {
-                    let inputs: Vec<&str> = model.inputs.iter().map(|input| input.name.as_str()).collect();
-                    let found = nonlinearities(&model.output.name, &inputs, record, innovations);
-                    validation.nonlinear.extend(found);
+                if report.model.expects_errors_of_one_size() {
+                    validation.nonlinear.extend(nonlinearities(output, inputs, record, innovations));
                 }
                 validation.warnings.extend(off_center(innovations));
             }
-            Err(why) => validation.warnings.push(format!(
-                "the residuals{} are not tested: {why}",
-                of_output(on_log, &model.output.name)
-            )),
+            Err(why) => validation
+                .warnings
+                .push(format!("the residuals{} are not tested: {why}", of_output(on_log, output))),
         }
     }
 }

@@ -4,7 +4,7 @@ use thetahat_numerics::optimize::Stopped;
 
 use super::fitted_rows::is_exact;
 use super::schema::Report;
-use crate::estimate::{ConvexOutcome, Procedure, SearchOutcome};
+use crate::estimate::SearchOutcome;
 use crate::figures::{error, fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
 use crate::select::{Grid, OrderRange};
@@ -54,26 +54,16 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
             number(largest)
         ));
     }
-    match &report.estimation.procedure {
-        Procedure::PredictionError(search) => warnings.extend(search_warnings(search)),
-        Procedure::Robust(outcome) => warnings.extend(search_warnings(&outcome.search)),
-        Procedure::ExactLikelihood(outcome) => {
-            warnings
-                .extend(search_warnings(&SearchOutcome { stability_bound: false, ..outcome.search.clone() }));
-            if outcome.search.stability_bound {
-                warnings.push(
-                    "the search ended at the stability boundary: A or C has a root on the unit circle; take differences of an \
-                     output that wanders without a level, and of one that was differenced too often none; or lower na or nc"
-                        .to_owned(),
-                );
-            }
-        }
-        Procedure::Constrained(ConvexOutcome { search: Some(search), .. }) => {
-            let iterations = search.costs.len().saturating_sub(1);
-            warnings.extend(stopped_early(search.stopped, iterations, None));
-        }
-        Procedure::Regularised(_) => warnings.extend(cut_off(model)),
-        _ => {}
+    let procedure = &report.estimation.procedure;
+    if let Some(search) = procedure.search() {
+        warnings.extend(search_warnings(search, procedure.exact_likelihood().is_some()));
+    }
+    if let Some(search) = procedure.constrained().and_then(|outcome| outcome.search.as_ref()) {
+        let iterations = search.costs.len().saturating_sub(1);
+        warnings.extend(stopped_early(search.stopped, iterations, None));
+    }
+    if procedure.regularised().is_some() {
+        warnings.extend(cut_off(model));
     }
     if let Some((pole, zero)) = near_cancellation(model) {
         // What A shares with C alone is in the plant all the same.
@@ -118,18 +108,24 @@ fn cut_off(model: &PolynomialModel) -> impl Iterator<Item = String> {
     })
 }
 
-/// What is worth a warning of a search.
-fn search_warnings(search: &SearchOutcome) -> Vec<String> {
+/// What is worth a warning of a search, also for the largest likelihood, in which A must be stable too.
+fn search_warnings(search: &SearchOutcome, of_likelihood: bool) -> Vec<String> {
     let (iterations, stopped) = (search.iterations, search.stopped);
-    let bounded = stopped == Stopped::NoDescent && search.stability_bound;
+    let bounded = stopped == Stopped::NoDescent && search.stability_bound && !of_likelihood;
     let early = (!bounded).then(|| stopped_early(stopped, iterations, Some(search.gradient_norm))).flatten();
     let mut warnings: Vec<String> = early.into_iter().collect();
     if search.stability_bound {
-        warnings.push(
-            "the search ended at the stability boundary: C or F has a root on the unit circle; the data want an \
-             unstable or overdifferenced model, so use arx or armax for an unstable plant, or lower nc or nf"
-                .to_owned(),
-        );
+        let roots = match of_likelihood {
+            true => {
+                "A or C has a root on the unit circle; take differences of an output that wanders without a level, and of one that was \
+                 differenced too often none; or lower na or nc"
+            }
+            false => {
+                "C or F has a root on the unit circle; the data want an unstable or overdifferenced model, so use arx or armax for an \
+                 unstable plant, or lower nc or nf"
+            }
+        };
+        warnings.push(format!("the search ended at the stability boundary: {roots}"));
     }
     warnings
 }
@@ -155,8 +151,7 @@ fn stopped_early(stopped: Stopped, iterations: usize, gradient: Option<f64>) -> 
 
 /// A warning of a plant that seems to be unstable, where F, which must be stable, explains little.
 pub(super) fn unstable_plant(report: &Report) -> Option<String> {
-    let Procedure::PredictionError(search) = &report.estimation.procedure else { return None };
-    let pole = search.unstable_pole?;
+    let pole = report.estimation.procedure.search()?.unstable_pole?;
     let explained = report.fit.first()?.percent?;
     (explained < POOR).then(|| {
         format!(

@@ -14,7 +14,6 @@
 mod errors;
 mod runner;
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -22,12 +21,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
-use super::on_log::{OnLog, Tested};
+use super::on_log::OnLog;
 use super::predict::check_steps;
-use super::{Forecast, Horizon, InitialCondition, Innovations, Response};
+use super::tested::Tested;
+use super::{Forecast, Horizon, InitialCondition, Response};
 use crate::Error;
 use crate::data::{Log, Record, Rows, measured};
-use crate::model::{NonlinearArxModel, Orders, PolynomialModel, RunError, Signal};
+use crate::model::{NonlinearArxModel, RunError, Signal};
 use errors::Errors;
 pub(crate) use runner::within;
 use runner::{Runner, Signals, Walk};
@@ -363,32 +363,14 @@ impl OnLog for NonlinearArxOnLog<'_> {
         (variance, mse.map(|mse| mse / variance))
     }
 
-    /// The errors of each output, as a model without parameters that sees the same inputs leaves them.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let (model, record) = (self.runner.model, &self.ahead);
-        let inputs = model.inputs.len();
-        let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;
+        let model = self.runner.model;
+        let driving = &self.ahead.inputs[..model.inputs.len()];
         let each = self.one_step().iter().zip(&model.outputs).zip(&self.signals.outputs);
         let each = each.map(|((response, signal), output)| {
-            let mut alone =
-                PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, model.sample_time)?;
-            alone.inputs.clone_from(&model.inputs);
-            alone.output = signal.clone();
-            let innovations = response.counted.iter().map(|rows| {
-                let errors = rows.clone().map(|t| output[t] - response.values[t]).collect();
-                Innovations::alone(rows.clone(), vec![rows.clone()], errors)
-            });
-            let innovations: Vec<Innovations> = innovations.collect();
-            let segments: Vec<Range<usize>> = response.counted.clone();
-            let record = Record {
-                output,
-                inputs: record.inputs[..inputs].to_vec(),
-                past: vec![0; segments.len()],
-                segments,
-            };
-            Ok(Tested { model: Cow::Owned(alone), record, innovations: Cow::Owned(innovations) })
+            Tested::of_response(signal, &model.inputs, output, driving.to_vec(), response)
         });
-        each.collect()
+        Ok(each.collect())
     }
 
     fn forecast(

@@ -1,12 +1,12 @@
 //! What a model says of the rows of a log, whatever its kind: all that its figures, tests and pages rest on.
 
-use std::borrow::Cow;
 use std::sync::OnceLock;
 
 use super::forecast::forecast_if_possible;
 use super::innovations::{Innovations, innovations};
 use super::predict::{check_start, check_steps, predicted};
 use super::sensitivities::{deviations_of, prediction_deviations};
+use super::tested::Tested;
 use super::{Forecast, Horizon, InitialCondition, Response, predict, simulate};
 use crate::Error;
 use crate::data::{Log, Record, Rows};
@@ -69,14 +69,6 @@ pub(crate) trait OnLog: Sync {
     fn clamped(&self) -> Option<usize> {
         None
     }
-}
-
-/// What is left of an output, and the model that says which of its past values it may depend on.
-#[derive(Debug)]
-pub(crate) struct Tested<'a> {
-    pub(crate) model: Cow<'a, PolynomialModel>,
-    pub(crate) record: Record<'a>,
-    pub(crate) innovations: Cow<'a, [Innovations]>,
 }
 
 /// A model of polynomials beside a log.
@@ -190,8 +182,7 @@ impl OnLog for PolynomialOnLog<'_> {
     }
 
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let (model, record) = (Cow::Borrowed(self.model), self.ahead.clone());
-        Ok(vec![Tested { model, record, innovations: Cow::Borrowed(self.innovations()?) }])
+        Ok(vec![Tested::of_polynomials(self.model, self.ahead.clone(), self.innovations()?)])
     }
 
     fn forecast(

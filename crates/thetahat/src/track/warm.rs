@@ -10,7 +10,7 @@ use super::estimator::Estimator;
 use super::plan::{PerChannel, TrackPlan};
 use super::tracker::{Stage, Tracker};
 use crate::Error;
-use crate::model::{Model, NonlinearArxModel, Orders, Parameter, PolynomialModel, Signal};
+use crate::model::{NonlinearArxModel, Orders, Parameter, PolynomialModel, Signal};
 use crate::report::Report;
 
 /// What P_jj of a parameter that nothing is known of is times the square of its scale, as
@@ -31,7 +31,7 @@ impl Tracker {
     /// plan asks for another start than `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
         check_start(plan)?;
-        if let Model::NonlinearArx(model) = &report.model {
+        if let Some(model) = report.model.as_nonlinear_arx() {
             return Self::from_nonlinear(model, report.estimation.samples, plan);
         }
         let model = polynomials(report)?;

@@ -57,8 +57,8 @@ pub(super) struct Setting<'t> {
 
 /// What the parameters have to do with the samples.
 pub(super) enum Parameters {
-    /// They were fitted to them.
-    Fitted,
+    /// They were fitted to them: X_k = E psi(t) e(t - k)/var e, a row for each lag.
+    Fitted(DMatrix<f64>),
     /// They come from elsewhere, with this covariance if it is known.
     Known(Option<DMatrix<f64>>),
 }
@@ -90,7 +90,7 @@ pub(super) fn independence(
     let covariance = own.clone_owned();
     let cross = moments.matrix(&past, psi);
     let (values, left) = match &setting.parameters {
-        Parameters::Fitted => {
+        Parameters::Fitted(_) => {
             let weights = &cross * setting.inverse;
             let taken = between * weights.transpose();
             let of_psi = products.view((lags, lags), (psi.len(), psi.len()));
@@ -108,7 +108,7 @@ pub(super) fn independence(
     let band =
         |variance: f64| if size > 0.0 { two_sided(0.05) * (samples * variance).sqrt() / size } else { 0.0 };
     let spread = |k: usize| match setting.parameters {
-        Parameters::Fitted => covariance[(k, k)],
+        Parameters::Fitted(_) => covariance[(k, k)],
         Parameters::Known(_) => left[(k, k)],
     };
     let lagged = |sums: &DVector<f64>| sums.iter().map(|sum| shown(*sum)).collect::<Vec<f64>>();

@@ -1,24 +1,17 @@
 //! The signals that tests of residuals are made of, and the sums of their products.
 //!
-//! ```text
-//! psi(t) = -de(t)/dtheta:   a_i: -(D/C) q^-i y        b_ji: (D/(C F_j)) q^-i u_j     f_ji: -(D/(C F_j)) q^-i x_j
-//!                           c_i:  (1/C) q^-i e         d_i: -(1/C) q^-i w
-//! ```
-//!
-//! with x_j = (B_j/F_j) u_j and w = A y - sum_j x_j (Ljung, System Identification, 2nd ed. 1999, section 10.3). All filters
-//! begin from rest at the first sample of a segment: what that leaves out dies away, and tests need psi to first order
-//! only. Each signal is measured from its mean over the samples that count: an offset of the log is no matter of dynamics.
-//! Every sum runs over these samples of every segment; what stands before a segment is zero.
+//! These are e, the inputs, and psi as the model has it (`respond::regressors`). Each signal is measured from its mean over the samples
+//! that count: an offset of the log is no matter of dynamics. Every sum runs over these samples of every segment; what stands before a
+//! segment is zero.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector, SymmetricEigen};
-use thetahat_numerics::regression::{Products, Taps, add_filtered, divide, sum};
+use thetahat_numerics::regression::{Products, Taps, sum};
 
 use crate::data::Record;
-use crate::model::PolynomialModel;
-use crate::respond::Innovations;
+use crate::respond::{Innovations, Regressor, RegressorSignal};
 
 /// A signal that is this close to its mean, as a fraction of it, is constant up to rounding.
 const CONSTANT: f64 = 1e-12;
@@ -54,15 +47,9 @@ impl<'a> Traces<'a> {
     /// e from its mean, zero where it does not count.
     pub(super) const ERROR: usize = 0;
 
-    /// `noise_free`: with (B/A) u in the place of y, as instruments have it; for models without C, D and F.
-    pub(super) fn new(
-        model: &PolynomialModel,
-        record: &Record<'a>,
-        innovations: &[Innovations],
-        noise_free: bool,
-    ) -> Self {
-        let length = record.output.len();
-        let mut error = vec![0.0; length];
+    /// Those of what is tested, with psi where somebody knows it and it is asked for.
+    pub(super) fn new(record: &Record<'a>, innovations: &[Innovations], psi: Vec<Regressor<'a>>) -> Self {
+        let mut error = vec![0.0; record.output.len()];
         let mut segments = Vec::with_capacity(innovations.len());
         for found in innovations {
             for counted in &found.counted {
@@ -72,72 +59,19 @@ impl<'a> Traces<'a> {
             segments.push(Segment { known: found.rows.clone(), counted: found.counted.clone() });
         }
         let inputs = record.inputs.iter().map(|input| Cow::Borrowed(*input));
-        let signals = std::iter::once(Cow::Owned(error)).chain(inputs).collect();
-        let mut traces = Self { signals, psi: Vec::new(), segments };
-        let orders = &model.orders;
-        let linear = orders.is_linear();
-        let over = |of: &dyn Fn(&Innovations) -> Vec<f64>| {
-            let mut signal = vec![0.0; length];
-            innovations.iter().for_each(|found| signal[found.rows.clone()].copy_from_slice(&of(found)));
-            Cow::Owned(signal)
-        };
-        // (D/(C F)) of a signal, from rest.
-        let filtered = |signal: &[f64], denominator: &[f64]| {
-            let mut values = product(&model.d, signal);
-            divide(&model.c, &mut values);
-            divide(denominator, &mut values);
-            values
-        };
-        let driven = |found: &Innovations, input: usize| {
-            let mut x = product(&model.b[input], &record.inputs[input][found.rows.clone()]);
-            divide(&model.f[input], &mut x);
-            x
-        };
-        let undriven = |found: &Innovations| {
-            let mut sum = vec![0.0; found.rows.len()];
-            for input in 0..orders.inputs() {
-                sum.iter_mut().zip(driven(found, input)).for_each(|(sum, x)| *sum += x);
-            }
-            divide(&model.a, &mut sum);
-            sum
-        };
-
-        if orders.na > 0 {
-            let output: Cow<'a, [f64]> = if !linear {
-                over(&|found| filtered(&record.output[found.rows.clone()], &[1.0]))
-            } else if noise_free {
-                over(&undriven)
-            } else {
-                Cow::Borrowed(record.output)
+        let mut signals: Vec<Cow<'a, [f64]>> = std::iter::once(Cow::Owned(error)).chain(inputs).collect();
+        let psi = psi.into_iter().map(|Regressor { signal, first, count, sign }| {
+            let signal = match signal {
+                RegressorSignal::Input(input) => Self::input(input),
+                RegressorSignal::Own(values) => {
+                    signals.push(values);
+                    signals.len() - 1
+                }
             };
-            traces.add(output, 1, orders.na, -1.0);
-        }
-        for input in (0..orders.inputs()).filter(|&input| orders.nb[input] > 0) {
-            let (first, count) = (orders.nk[input], orders.nb[input]);
-            if linear {
-                traces.psi.push(Taps { signal: Self::input(input), first, count, sign: 1.0 });
-            } else {
-                let of = |found: &Innovations| {
-                    filtered(&record.inputs[input][found.rows.clone()], &model.f[input])
-                };
-                traces.add(over(&of), first, count, 1.0);
-            }
-        }
-        let noise = |values: &[f64]| {
-            let mut values = values.to_vec();
-            divide(&model.c, &mut values);
-            values
-        };
-        if orders.nc > 0 {
-            traces.add(over(&|found| noise(&found.errors)), 1, orders.nc, 1.0);
-        }
-        if orders.nd > 0 {
-            traces.add(over(&|found| noise(&found.disturbance)), 1, orders.nd, -1.0);
-        }
-        for input in (0..orders.inputs()).filter(|&input| orders.nf[input] > 0) {
-            let of = |found: &Innovations| filtered(&driven(found, input), &model.f[input]);
-            traces.add(over(&of), 1, orders.nf[input], -1.0);
-        }
+            Taps { signal, first, count, sign }
+        });
+        let psi = psi.collect();
+        let mut traces = Self { signals, psi, segments };
         traces.center();
         traces
     }
@@ -162,11 +96,6 @@ impl<'a> Traces<'a> {
                 values.iter_mut().for_each(|value| *value -= mean);
             }
         }
-    }
-
-    fn add(&mut self, signal: Cow<'a, [f64]>, first: usize, count: usize, sign: f64) {
-        self.psi.push(Taps { signal: self.signals.len(), first, count, sign });
-        self.signals.push(signal);
     }
 
     /// Which signal an input is.
@@ -197,13 +126,6 @@ impl<'a> Traces<'a> {
         let span = |segment: &Segment| Some(segment.counted.first()?.start..segment.counted.last()?.end);
         self.segments.iter().filter_map(span).collect()
     }
-}
-
-/// P of a signal, from rest.
-fn product(polynomial: &[f64], signal: &[f64]) -> Vec<f64> {
-    let mut values = vec![0.0; signal.len()];
-    add_filtered(&mut values, &(0..signal.len()), polynomial, signal, 0);
-    values
 }
 
 /// The columns of taps.
@@ -264,6 +186,9 @@ impl Moments {
 
 /// The eigenvalues and eigenvectors of a symmetric matrix; none if an entry is not finite.
 pub(super) fn eigen(matrix: DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    if matrix.is_empty() {
+        return Some((DVector::zeros(0), matrix));
+    }
     if !matrix.iter().all(|value| value.is_finite()) {
         return None;
     }

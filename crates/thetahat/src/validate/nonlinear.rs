@@ -17,7 +17,7 @@ use thetahat_numerics::distribution::chi_square_tail;
 
 use super::verdict::Test;
 use crate::data::Record;
-use crate::respond::Innovations;
+use crate::respond::{Innovations, TestedInput};
 
 /// The longest lag.
 const LAGS: usize = 20;
@@ -44,12 +44,13 @@ pub struct Nonlinearity {
 /// The tests of the errors of one output, for each input of which the square is not constant.
 pub(crate) fn nonlinearities(
     output: &str,
-    inputs: &[&str],
+    inputs: &[TestedInput<'_>],
     record: &Record<'_>,
     innovations: &[Innovations],
 ) -> Vec<Nonlinearity> {
-    let each = inputs.iter().zip(&record.inputs);
-    each.filter_map(|(name, signal)| nonlinearity(output, name, signal, innovations)).collect()
+    let each = inputs.iter();
+    each.filter_map(|input| nonlinearity(output, input.name, record.inputs[input.place], innovations))
+        .collect()
 }
 
 fn nonlinearity(output: &str, input: &str, u: &[f64], innovations: &[Innovations]) -> Option<Nonlinearity> {

@@ -10,11 +10,9 @@ use thetahat_numerics::regression::{Taps, sum_of_squares};
 use super::independence::{Parameters, Setting, independence};
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::verdict::{Anderson, Independence, Test};
-use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs, past_errors};
-use crate::data::Record;
-use crate::estimate::autoregression;
-use crate::model::PolynomialModel;
-use crate::respond::Innovations;
+use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, pairs};
+use crate::estimate::{NullDistribution, autoregression};
+use crate::respond::{Regressors, Tested, TestedInput};
 
 /// Fewer samples than this, and one for each parameter that was fitted to them, say nothing.
 const FEWEST: usize = 10;
@@ -48,17 +46,6 @@ pub struct Residuals {
     pub anderson: Anderson,
     /// Whether past inputs are still in the residuals, for each input with a B.
     pub independence: Vec<Independence>,
-}
-
-/// What the parameters have to do with the samples that are evaluated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Relation {
-    /// They were fitted to them, or to some of them.
-    Fitted,
-    /// The same, by instrumental variables.
-    Instrumental,
-    /// They come from other samples.
-    Fresh,
 }
 
 /// Why residuals cannot be tested.
@@ -106,22 +93,26 @@ impl fmt::Display for Untestable {
 }
 
 impl Residuals {
-    /// The tests of the innovations of a model over a record: `lags` of the autocorrelation, Anderson's test at `alphas` with
-    /// its verdicts at `level`.
+    /// The tests of what a model leaves of an output: `lags` of the autocorrelation, Anderson's test at `alphas` with its verdicts at `level`.
     ///
     /// There are lags up to a tenth of the samples, of inputs to a fifth, and as far as a quarter of the samples have
     /// a partner. O(N (L + p)), and O(N (L + p)^2) where the residuals are coloured.
     pub(crate) fn of(
-        model: &PolynomialModel,
-        record: &Record<'_>,
-        innovations: &[Innovations],
-        relation: Relation,
+        tested: &Tested<'_>,
+        null: NullDistribution,
         lags: usize,
         alphas: &[f64],
         level: f64,
     ) -> Result<Self, Untestable> {
-        let fitted = if relation == Relation::Fresh { 0 } else { model.orders.parameters() };
-        let traces = Traces::new(model, record, innovations, relation == Relation::Instrumental);
+        let Tested { output, inputs, record, innovations, model } = tested;
+        // Of models that the tests do not know, nothing else can be said.
+        let fitted_by = model.filter(|_| null != NullDistribution::Known);
+        let fitted = fitted_by.map_or(0, Regressors::parameters);
+        let known = model.filter(|model| fitted_by.is_some() || model.covariance().is_some());
+        let psi = known.map_or_else(Vec::new, |model| {
+            model.regressors(record, innovations, null == NullDistribution::Instrumental)
+        });
+        let traces = Traces::new(record, innovations, psi);
         let counted = traces.counted();
         let samples: usize = counted.iter().map(Range::len).sum();
         let needed = FEWEST + fitted;
@@ -147,9 +138,12 @@ impl Residuals {
             return Err(Untestable::Range);
         }
 
-        let inputs = model.inputs.iter().enumerate().filter(|(input, _)| model.orders.nb[*input] > 0);
+        // As many lags as of the autocorrelation, and more than the plant has parameters after its delay.
+        let past_lags = |input: &TestedInput<'_>| lags.max(input.reach + MORE_LAGS).min(longest);
         let inputs: Vec<(usize, &str, usize)> = inputs
-            .map(|(input, signal)| (input, signal.name.as_str(), past_lags(model, input, lags).min(longest)))
+            .iter()
+            .filter(|input| input.reach > 0)
+            .map(|input| (input.place, input.name, past_lags(input)))
             .collect();
         let error = Taps { signal: Traces::ERROR, first: 1, count: lags, sign: 1.0 };
         let mut taps = traces.psi.clone();
@@ -163,20 +157,18 @@ impl Residuals {
         let moments = Moments::new(&traces, &taps);
         let psi = columns(&traces.psi);
         let inverse = pseudo_inverse(&moments.matrix(&psi, &psi)).ok_or(Untestable::Range)?;
-        let parameters = match (relation, &model.covariance) {
-            (Relation::Fitted | Relation::Instrumental, _) => Parameters::Fitted,
-            (Relation::Fresh, None) => Parameters::Known(None),
-            (Relation::Fresh, Some(rows)) => {
-                Parameters::Known(Some(DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j])))
-            }
+        let parameters = match (fitted_by, known.and_then(Regressors::covariance)) {
+            (Some(model), _) => Parameters::Fitted(model.past_errors(lags)),
+            (None, rows) => Parameters::Known(
+                rows.map(|rows| DMatrix::from_fn(rows.len(), rows.len(), |i, j| rows[i][j])),
+            ),
         };
 
         let count = samples as f64;
         let own = DMatrix::identity(lags, lags);
         let (shift, covariance) = match &parameters {
-            Parameters::Fitted => {
-                let past = past_errors(model, lags);
-                let weights = &past * &inverse;
+            Parameters::Fitted(past) => {
+                let weights = past * &inverse;
                 let covariance = own - &weights * past.transpose() * square;
                 (weights * moments.with_error(&psi), covariance)
             }
@@ -203,7 +195,7 @@ impl Residuals {
             inputs.iter().map(|&(input, name, lags)| independence(&setting, name, input, lags));
         let independence = independence.collect::<Option<Vec<_>>>().ok_or(Untestable::Range)?;
         Ok(Self {
-            output: model.output.name.clone(),
+            output: (*output).to_owned(),
             samples,
             fitted,
             autocorrelation: std::iter::once(1.0).chain(correlation.values.iter().copied()).collect(),
@@ -213,12 +205,4 @@ impl Residuals {
             independence,
         })
     }
-}
-
-/// How many past lags of an input are tested: as many as of the autocorrelation, and more than the plant has
-/// parameters after its delay.
-fn past_lags(model: &PolynomialModel, input: usize, lags: usize) -> usize {
-    let orders = &model.orders;
-    let plant = orders.na + orders.nb[input] + orders.nf[input];
-    lags.max(orders.nk[input] + plant + MORE_LAGS)
 }

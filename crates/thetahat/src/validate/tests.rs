@@ -8,13 +8,13 @@ use thetahat_numerics::noise::Noise;
 
 use super::moments::{Moments, Traces, columns, pseudo_inverse};
 use super::residuals::Untestable;
-use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box, past_errors};
+use super::whiteness::{Autocorrelation, anderson, anderson_lags, ljung_box};
 use super::*;
 use crate::Error;
 use crate::data::Record;
-use crate::estimate::{Initial, arx, autoregression};
+use crate::estimate::{Initial, NullDistribution, arx, autoregression};
 use crate::model::{Orders, PolynomialModel, Signal};
-use crate::respond::{InitialCondition, innovations};
+use crate::respond::{InitialCondition, Innovations, Regressors, Tested, innovations};
 
 /// y(t) = 1.2 y(t-1) - 0.5 y(t-2) + u(t-1) + 0.4 u(t-2) + e(t).
 const A: [f64; 2] = [-1.2, 0.5];
@@ -46,9 +46,23 @@ fn truth() -> PolynomialModel {
     named(PolynomialModel::from_parameters(&orders(), &parameters, None, 0.01, 1.0).unwrap())
 }
 
-fn tested(model: &PolynomialModel, record: &Record<'_>, relation: Relation) -> Result<Residuals, Untestable> {
+fn tested(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    null: NullDistribution,
+) -> Result<Residuals, Untestable> {
     let found = innovations(model, record, 1, InitialCondition::Drop).unwrap();
-    Residuals::of(model, record, &found, relation, 25, &[0.05, 0.2], 0.05)
+    let tested = Tested::of_polynomials(model, record.clone(), &found);
+    Residuals::of(&tested, null, 25, &[0.05, 0.2], 0.05)
+}
+
+fn traces<'a>(
+    model: &PolynomialModel,
+    record: &Record<'a>,
+    found: &[Innovations],
+    noise_free: bool,
+) -> Traces<'a> {
+    Traces::new(record, found, model.regressors(record, found, noise_free))
 }
 
 fn close(found: f64, expected: f64, tolerance: f64) -> bool {
@@ -175,7 +189,7 @@ fn psi_is_the_derivative_of_the_errors() {
         };
         let values: Vec<f64> = model.parameters.iter().map(|parameter| parameter.value).collect();
         let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
-        let traces = Traces::new(&model, &record, &found, false);
+        let traces = traces(&model, &record, &found, false);
         let psi = columns(&traces.psi);
         let moments = Moments::new(&traces, &traces.psi);
         assert_eq!(psi.len(), values.len());
@@ -222,7 +236,7 @@ fn instruments_are_free_of_noise() {
     let (u, y) = experiment(300, 0.3);
     let record = Record::new(&y, vec![&u]).unwrap();
     let found = innovations(&truth(), &record, 1, InitialCondition::Drop).unwrap();
-    let traces = Traces::new(&truth(), &record, &found, true);
+    let traces = traces(&truth(), &record, &found, true);
     let (_, clean) = experiment(300, 0.0);
     let signal = traces.signal(traces.psi[0].signal);
     let offset = clean[299] - signal[299];
@@ -246,13 +260,13 @@ fn past_errors_are_in_psi_as_the_model_has_it() {
     }
     let record = Record::new(&y, vec![&u]).unwrap();
     let found = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
-    let traces = Traces::new(&model, &record, &found, false);
+    let traces = traces(&model, &record, &found, false);
     let error = thetahat_numerics::regression::Taps { signal: Traces::ERROR, first: 1, count: 6, sign: 1.0 };
     let taps = [&traces.psi[..], &[error]].concat();
     let moments = Moments::new(&traces, &taps);
     let square: f64 = traces.signal(Traces::ERROR).iter().map(|e| e * e).sum();
     let sums = moments.matrix(&columns(&[error]), &columns(&traces.psi)) / square;
-    let expected = past_errors(&model, 6);
+    let expected = model.past_errors(6);
     // Ten standard deviations of the sums, or so.
     assert!((&sums - &expected).amax() < 0.03, "{sums} {expected}");
     // a1: -1/A, with a delay of one; b: nothing; c: 1/C; d: -1/D.
@@ -263,7 +277,7 @@ fn past_errors_are_in_psi_as_the_model_has_it() {
     // An unstable A has no such response.
     let mut unstable = model;
     unstable.a = vec![1.0, -2.0, 0.5];
-    assert!(past_errors(&unstable, 3).columns(0, 2).iter().all(|value| *value == 0.0));
+    assert!(unstable.past_errors(3).columns(0, 2).iter().all(|value| *value == 0.0));
 }
 
 /// sum u(t - k) e(t), means taken off, u zero before the first sample.
@@ -278,7 +292,7 @@ fn independence_of_a_known_model_is_the_quadratic_form_of_its_definition() {
     let (u, y) = experiment(samples, 0.3);
     let record = Record { past: vec![2], ..Record::new(&y, vec![&u]).unwrap() };
     let record = Record { segments: std::iter::once(2..samples).collect(), ..record };
-    let found = tested(&truth(), &record, Relation::Fresh).unwrap();
+    let found = tested(&truth(), &record, NullDistribution::Known).unwrap();
     assert_eq!((found.samples, found.fitted), (298, 0));
     let test = &found.independence[0];
     assert_eq!((test.input.as_str(), test.past.lags, test.past.degrees), ("u", 25, 25.0));
@@ -332,7 +346,8 @@ fn coloured_residuals_have_the_variance_of_their_colour() {
     let y: Vec<f64> = x.iter().zip(&e).map(|(x, e)| x + e).collect();
     let record = Record::new(&y, vec![&u]).unwrap();
     let innovations = innovations(&model, &record, 1, InitialCondition::Zero).unwrap();
-    let found = Residuals::of(&model, &record, &innovations, Relation::Fresh, 25, &[], 0.05).unwrap();
+    let tested = Tested::of_polynomials(&model, record.clone(), &innovations);
+    let found = Residuals::of(&tested, NullDistribution::Known, 25, &[], 0.05).unwrap();
     let mean = e.iter().sum::<f64>() / samples as f64;
     let e: Vec<f64> = e.iter().map(|e| e - mean).collect();
     let all = 0..samples;
@@ -360,7 +375,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     let record = Record::new(&y, vec![&u]).unwrap();
     let estimate = arx(&record, &orders(), Initial::Drop).unwrap();
     let model = named(estimate.to_model(&orders(), 1.0, vec![Signal::default()], Signal::default()).unwrap());
-    let found = tested(&model, &record, Relation::Fitted).unwrap();
+    let found = tested(&model, &record, NullDistribution::Fitted).unwrap();
     assert_eq!((found.samples, found.fitted), (398, 4));
     let test = &found.independence[0];
     // u(t - 1) and u(t - 2) are columns of psi: e is orthogonal to them, and so almost to what the other two have of u.
@@ -368,10 +383,10 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     assert!(zero(1) < 1e-3 && zero(2) < 1e-3, "{} {}", zero(1), zero(2));
     assert!((21.0..=23.0).contains(&test.past.degrees), "{}", test.past.degrees);
     // The parameters are taken as the truth, uncertain by their covariance, on other samples.
-    let fresh = tested(&model, &record, Relation::Fresh).unwrap();
+    let fresh = tested(&model, &record, NullDistribution::Known).unwrap();
     assert_eq!((fresh.fitted, fresh.independence[0].past.degrees, fresh.ljung_box.degrees), (0, 25.0, 25.0));
     let certain = PolynomialModel { covariance: None, ..model.clone() };
-    let certain = tested(&certain, &record, Relation::Fresh).unwrap();
+    let certain = tested(&certain, &record, NullDistribution::Known).unwrap();
     assert!(fresh.independence[0].past.statistic < certain.independence[0].past.statistic);
     assert!(fresh.ljung_box.statistic < certain.ljung_box.statistic);
 
@@ -380,7 +395,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     let noise = Record::new(&y, vec![]).unwrap();
     let estimate = arx(&noise, &orders, Initial::Drop).unwrap();
     let model = estimate.to_model(&orders, 1.0, vec![], Signal::default()).unwrap();
-    let found = tested(&model, &noise, Relation::Fitted).unwrap();
+    let found = tested(&model, &noise, NullDistribution::Fitted).unwrap();
     assert_eq!((found.ljung_box.degrees, found.independence.len()), (23.0, 0));
     // Two standard errors beside the least sum of squares, a known model is rejected by about four more; here that is
     // taken off.
@@ -390,7 +405,7 @@ fn what_the_fit_took_has_no_degrees_of_freedom() {
     ];
     let moved =
         PolynomialModel::from_parameters(&orders, &parameters, None, model.noise_variance, 1.0).unwrap();
-    let beside = tested(&moved, &noise, Relation::Fitted).unwrap().ljung_box.statistic;
+    let beside = tested(&moved, &noise, NullDistribution::Fitted).unwrap().ljung_box.statistic;
     assert!((beside - found.ljung_box.statistic).abs() < 1.0, "{beside}");
 }
 
@@ -403,7 +418,7 @@ fn on_other_samples_the_errors_of_the_parameters_come_on_top() {
     let model = PolynomialModel { covariance: Some(rows), ..truth() };
     let record = Record { past: vec![2], ..Record::new(&y, vec![&u]).unwrap() };
     let record = Record { segments: std::iter::once(2..samples).collect(), ..record };
-    let found = tested(&model, &record, Relation::Fresh).unwrap();
+    let found = tested(&model, &record, NullDistribution::Known).unwrap();
 
     let (n, lags) = (198.0, 19);
     let centered = |values: &[f64]| {
@@ -446,7 +461,7 @@ fn a_wrong_delay_is_seen_at_its_lag() {
     let orders = Orders::arx(2, &[2], &[3]).unwrap();
     let estimate = arx(&record, &orders, Initial::Drop).unwrap();
     let model = named(estimate.to_model(&orders, 1.0, vec![Signal::default()], Signal::default()).unwrap());
-    let found = tested(&model, &record, Relation::Fitted).unwrap();
+    let found = tested(&model, &record, NullDistribution::Fitted).unwrap();
     let test = &found.independence[0];
     assert!(test.past.p_value.unwrap() < 1e-9);
     let past = &test.correlation[26..];
@@ -461,8 +476,9 @@ fn an_input_that_is_not_rich_has_few_directions() {
     let y = noise.take(500);
     let orders = Orders::arx(0, &[1], &[1]).unwrap();
     let model = named(PolynomialModel::from_parameters(&orders, &[0.0], None, 1.0, 1.0).unwrap());
-    let test =
-        |u: &[f64]| tested(&model, &Record::new(&y, vec![u]).unwrap(), Relation::Fresh).unwrap().independence;
+    let test = |u: &[f64]| {
+        tested(&model, &Record::new(&y, vec![u]).unwrap(), NullDistribution::Known).unwrap().independence
+    };
     // A sinusoid has two, and a few at the ends.
     assert!((2.0..=5.0).contains(&test(&u)[0].past.degrees), "{}", test(&u)[0].past.degrees);
     // A constant has none.
@@ -474,9 +490,9 @@ fn an_input_that_is_not_rich_has_few_directions() {
 #[test]
 fn offsets_are_no_matter_of_dynamics() {
     let (u, y) = experiment(300, 0.3);
-    let plain = tested(&truth(), &Record::new(&y, vec![&u]).unwrap(), Relation::Fresh).unwrap();
+    let plain = tested(&truth(), &Record::new(&y, vec![&u]).unwrap(), NullDistribution::Known).unwrap();
     let moved: Vec<f64> = y.iter().map(|y| y + 2.0).collect();
-    let found = tested(&truth(), &Record::new(&moved, vec![&u]).unwrap(), Relation::Fresh).unwrap();
+    let found = tested(&truth(), &Record::new(&moved, vec![&u]).unwrap(), NullDistribution::Known).unwrap();
     assert!(close(found.ljung_box.statistic, plain.ljung_box.statistic, 1e-9));
     assert!(close(found.independence[0].past.statistic, plain.independence[0].past.statistic, 1e-9));
 }
@@ -485,7 +501,7 @@ fn offsets_are_no_matter_of_dynamics() {
 fn residuals_that_cannot_be_tested_say_why() {
     let (u, y) = experiment(200, 0.3);
     let with = |y: &[f64]| {
-        let found = tested(&truth(), &Record::new(y, vec![&u[..y.len()]]).unwrap(), Relation::Fitted);
+        let found = tested(&truth(), &Record::new(y, vec![&u[..y.len()]]).unwrap(), NullDistribution::Fitted);
         found.map(|_| ()).map_err(|why| why.to_string())
     };
     assert_eq!(with(&y[..16]), Ok(()));
@@ -498,7 +514,7 @@ fn residuals_that_cannot_be_tested_say_why() {
     let alone = Orders::arx(1, &[], &[]).unwrap();
     let model = PolynomialModel::from_parameters(&alone, &[-0.5], None, 1.0, 1.0).unwrap();
     let silent = [0.0; 50];
-    let found = tested(&model, &Record::new(&silent, vec![]).unwrap(), Relation::Fresh);
+    let found = tested(&model, &Record::new(&silent, vec![]).unwrap(), NullDistribution::Known);
     assert_eq!(found.map(|_| ()), Err(Untestable::Nothing));
 }
 
@@ -508,7 +524,7 @@ fn short_logs_have_fewer_lags() {
     let of = |segments: Vec<Range<usize>>| {
         let past = vec![0; segments.len()];
         let record = Record { segments, past, ..Record::new(&y, vec![&u]).unwrap() };
-        let found = tested(&truth(), &record, Relation::Fresh).unwrap();
+        let found = tested(&truth(), &record, NullDistribution::Known).unwrap();
         (found.ljung_box.lags, found.anderson.lags, found.independence[0].past.lags)
     };
     assert_eq!(of(std::iter::once(0..400).collect()), (25, 19, 25));

@@ -27,11 +27,10 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::distribution::{binomial_mid_p, chi_square_tail, outside, two_sided};
-use thetahat_numerics::regression::{Lagged, Presample, Taps, divide};
+use thetahat_numerics::regression::{Lagged, Presample, Taps};
 
 use super::moments::eigen;
 use super::verdict::{Anderson, AndersonLevel, Test};
-use crate::model::{PolynomialModel, polynomial::is_stable};
 
 /// Directions of which the fit has left less than this fraction say nothing.
 const FREE: f64 = 0.05;
@@ -88,34 +87,6 @@ pub(super) fn pairs(segments: &[&[Range<usize>]], lag: usize) -> usize {
         count
     };
     segments.iter().copied().map(of).sum()
-}
-
-/// X, a row for each lag 1 … L and a column for each parameter. Zero for an unstable A or D, which has no such response.
-pub(super) fn past_errors(model: &PolynomialModel, lags: usize) -> DMatrix<f64> {
-    let orders = &model.orders;
-    let response = |monic: &[f64]| {
-        let mut response = vec![0.0; lags];
-        if is_stable(monic, &mut Vec::new()) {
-            response.iter_mut().take(1).for_each(|first| *first = 1.0);
-            divide(monic, &mut response);
-        }
-        response
-    };
-    let inputs: usize = orders.nb.iter().sum();
-    let mut matrix = DMatrix::zeros(lags, orders.parameters());
-    let (c, d) = (orders.na + inputs, orders.na + inputs + orders.nc);
-    for (first, count, sign, monic) in
-        [(0, orders.na, -1.0, &model.a), (c, orders.nc, 1.0, &model.c), (d, orders.nd, -1.0, &model.d)]
-    {
-        let response = response(monic);
-        for delay in 0..count {
-            // q^-1 for the first coefficient: from lag 1 on, which is row 0.
-            for (row, value) in (delay..lags).zip(&response) {
-                matrix[(row, first + delay)] = sign * value;
-            }
-        }
-    }
-    matrix
 }
 
 /// How many lags Anderson's test counts: those of Ljung and Box's test, as far as they are few beside the samples.

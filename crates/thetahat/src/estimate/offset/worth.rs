@@ -6,7 +6,7 @@ use thetahat_numerics::regression::{Presample, sum, sum_above};
 use super::super::arx::with_past;
 use super::super::experiment_data::{ExperimentData, PredictionErrors};
 use super::super::prediction_error::predictor_of;
-use super::super::{Estimate, Initial, Norm, Procedure, arx};
+use super::super::{Estimate, Initial, Norm, arx};
 use crate::data::Record;
 use crate::model::Orders;
 
@@ -27,26 +27,13 @@ pub(super) fn white_samples(data: &impl ExperimentData, orders: &Orders, estimat
 /// samples counts.
 pub(super) fn is_worth(without: &Estimate, with: &Estimate, share: f64) -> bool {
     let samples = with.samples() as f64;
-    let price = 1.0 + conditions(with) as f64 - conditions(without) as f64;
-    let size = |estimate: &Estimate| match estimate.procedure() {
-        Procedure::Constrained(outcome) if outcome.norm != Norm::Two => outcome.objective.powi(2),
-        _ => estimate.cost(),
+    let conditions = |estimate: &Estimate| estimate.procedure().initial_conditions() as f64;
+    let price = 1.0 + conditions(with) - conditions(without);
+    let size = |estimate: &Estimate| {
+        let constrained = estimate.procedure().constrained().filter(|outcome| outcome.norm != Norm::Two);
+        constrained.map_or_else(|| estimate.cost(), |outcome| outcome.objective.powi(2))
     };
     without.mse() > 0.0 && share * samples * (size(without) / size(with)).ln() > price * samples.ln()
-}
-
-/// The initial conditions that were estimated.
-pub(super) fn conditions(estimate: &Estimate) -> usize {
-    match estimate.procedure() {
-        Procedure::PredictionError(outcome) => outcome.initial_conditions,
-        Procedure::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
-        Procedure::ExactLikelihood(outcome) => outcome.search.initial_conditions,
-        Procedure::Robust(outcome) => outcome.search.initial_conditions,
-        Procedure::Constrained(outcome) => {
-            outcome.search.as_ref().map_or(0, |search| search.initial_conditions)
-        }
-        _ => 0,
-    }
 }
 
 /// Whether a constant lowers the MDL of a linear model of a record.

@@ -213,6 +213,9 @@ fn one_input_alone_has_the_same_plant_either_way() {
             }
         }
         assert!((sum_of_squares(&errors) / 600.0 / alone.mse() - 1.0).abs() < 1e-9);
-        assert_eq!((shared.samples(), conditions(&shared)), (alone.samples(), conditions(&alone)));
+        assert_eq!(
+            (shared.samples(), shared.procedure().initial_conditions()),
+            (alone.samples(), alone.procedure().initial_conditions())
+        );
     }
 }

@@ -1,6 +1,6 @@
 use super::*;
 use crate::data::Channel;
-use crate::model::Orders;
+use crate::model::{Orders, PolynomialModel};
 use crate::respond::prediction_deviation;
 
 /// A(q) y = B(q) u + e around levels and slopes, with an input if there is a B.

@@ -2,7 +2,7 @@
 
 use thetahat_numerics::optimize::Stopped;
 
-use crate::estimate::{Procedure, equations::listed};
+use crate::estimate::equations::listed;
 use crate::figures::{chance, fixed};
 use crate::model::{EquationsModel, GreyBox};
 use crate::report::schema::Estimation;
@@ -33,7 +33,7 @@ pub(super) fn of_inputs(model: &GreyBox, experiments: &[Experiment], rows: usize
 /// Of the search and what it found. `walking` are the parameters that the model lets drift.
 pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &[String]) -> Vec<String> {
     let mut warnings = Vec::new();
-    let Procedure::InnovationsLikelihood(outcome) = &estimation.procedure else { return warnings };
+    let Some(outcome) = estimation.procedure.equations() else { return warnings };
     match outcome.search.stopped {
         Stopped::Converged => {}
         Stopped::NoDescent => warnings.push(

@@ -235,10 +235,7 @@ pub(super) fn noise_of_outputs(model: &StateSpaceModel) -> Table {
 pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table {
     let head = ["parameter", "value", "unit", "standard error", "if errors were white"];
     let mut table = Table::new("Parameters", &head);
-    let (Procedure::FreeRun(outcome) | Procedure::FrequencyResponse(outcome)) = &report.estimation.procedure
-    else {
-        return table;
-    };
+    let Some(outcome) = report.estimation.procedure.process() else { return table };
     let units = model.structures.iter().zip(model.of_inputs());
     let units =
         units.flat_map(|(structure, own)| own.iter().map(|parameter| structure.unit(&parameter.name)));
@@ -258,10 +255,7 @@ pub(super) fn process_parameters(report: &Report, model: &ProcessModel) -> Table
 pub(super) fn unknown_parameters(report: &Report, model: &EquationsModel) -> Table {
     let head = ["parameter", "value", "standard error", "start", "min", "max", "change of variable"];
     let mut table = Table::new("Parameters", &head);
-    let unknown = match &report.estimation.procedure {
-        Procedure::InnovationsLikelihood(outcome) => outcome.unknown.as_slice(),
-        _ => &[],
-    };
+    let unknown = report.estimation.procedure.equations().map_or(&[][..], |outcome| &outcome.unknown);
     for (parameter, known) in model.parameters.iter().zip(unknown) {
         table.row([
             parameter.name.clone(),
@@ -279,10 +273,7 @@ pub(super) fn unknown_parameters(report: &Report, model: &EquationsModel) -> Tab
 /// Where the states of a model in equations start in its free runs on the estimation rows.
 pub(super) fn starts(report: &Report, model: &EquationsModel) -> Table {
     let mut table = Table::new("States", &["state", "start of each free run on the estimation rows"]);
-    let starts = match &report.estimation.procedure {
-        Procedure::InnovationsLikelihood(outcome) => outcome.starts.as_slice(),
-        _ => &[],
-    };
+    let starts = report.estimation.procedure.equations().map_or(&[][..], |outcome| &outcome.starts);
     for (state, starts) in model.states.iter().zip(starts) {
         let starts: Vec<String> = starts.iter().map(|start| or_dash(*start, number)).collect();
         table.row([state.clone(), starts.join(", ")]);
@@ -299,7 +290,7 @@ pub(super) fn estimation(estimation: &Estimation, noise_variance: Option<f64>) -
     if let Some(variance) = noise_variance {
         add("noise variance", number(variance));
     }
-    if let Procedure::InnovationsLikelihood(outcome) = &estimation.procedure {
+    if let Some(outcome) = estimation.procedure.equations() {
         let nis = outcome.nis.as_ref();
         add("ln L", number(outcome.log_likelihood));
         add(

@@ -3,7 +3,6 @@
 use thetahat_numerics::optimize::Stopped;
 
 use crate::data::Record;
-use crate::estimate::Procedure;
 use crate::figures::{number, short};
 use crate::model::{Parameter, ProcessModel, polynomial};
 use crate::report::Estimation;
@@ -76,7 +75,7 @@ pub(super) fn of_fit(
         words.push(format!("{missing} missing values of inputs hold the value before them"));
     }
     words.extend(of_parameters(model, longest));
-    if let Procedure::FreeRun(outcome) = &estimation.procedure {
+    if let Some(outcome) = estimation.procedure.free_run() {
         match outcome.stopped {
             Stopped::MaxIterations | Stopped::TimeLimit => words.push(
                 "the search was stopped before it came to its end: give it more iterations or time"

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use thetahat_numerics::optimize::Stopped;
 
-use crate::estimate::{Procedure, RefinementOutcome, SubspaceOutcome, VectorArxOutcome, VectorArxScore};
+use crate::estimate::{RefinementOutcome, SubspaceOutcome, VectorArxOutcome, VectorArxScore};
 use crate::figures::fixed;
 use crate::model::StateSpaceModel;
 use crate::report::Estimation;
@@ -31,19 +31,18 @@ pub(super) fn of_fit(
             model.free_parameters
         ));
     }
-    match &estimation.procedure {
-        Procedure::Subspace(outcome) => of_subspace(&mut warnings, model, outcome, offered),
-        Procedure::VectorArx(outcome) => {
-            of_arx(&mut warnings, outcome);
-            if model.covariance.is_none() {
-                warnings.push(
-                    "there are too many coefficients for a report to keep the covariance of all: they have standard errors, poles, gains \
-                     and responses have none"
-                        .to_owned(),
-                );
-            }
+    if let Some(outcome) = estimation.procedure.subspace() {
+        of_subspace(&mut warnings, model, outcome, offered);
+    }
+    if let Some(outcome) = estimation.procedure.vector_arx() {
+        of_arx(&mut warnings, outcome);
+        if model.covariance.is_none() {
+            warnings.push(
+                "there are too many coefficients for a report to keep the covariance of all: they have standard errors, poles, gains \
+                 and responses have none"
+                    .to_owned(),
+            );
         }
-        _ => {}
     }
     let noise = &model.noise_covariance;
     for (second, output) in model.outputs.iter().enumerate() {

@@ -1,6 +1,5 @@
 //! A model in equations beside a log.
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -12,11 +11,12 @@ use super::free_run::{FreeRun, InitialState, free_run};
 use super::predictor::Predictor;
 use super::walk::{Failure, Predicted, ahead, beyond, walk};
 use crate::Error;
-use crate::data::{Log, Record, Rows, measured};
-use crate::model::{EquationsModel, GreyBox, Orders, PolynomialModel, Signal};
+use crate::data::{Log, Rows, measured};
+use crate::model::{EquationsModel, GreyBox, Signal};
 use crate::respond::{
     Forecast, Horizon, InitialCondition, Innovations, Response, check_steps,
-    on_log::{OnLog, Tested},
+    on_log::OnLog,
+    tested::{Tested, record_of},
 };
 
 /// Derivatives that are computed together.
@@ -37,7 +37,6 @@ pub(crate) struct EquationsOnLog<'l> {
     /// The inputs, a missing value held.
     inputs: Vec<Vec<f64>>,
     rows: usize,
-    sample_time: f64,
     /// What the filter says of each output.
     filtered: OnceLock<Vec<Filtered>>,
 }
@@ -90,7 +89,6 @@ impl<'l> EquationsOnLog<'l> {
             measured: outputs,
             inputs,
             rows: length,
-            sample_time: log.sample_time(),
             stored,
             model,
             z,
@@ -358,19 +356,12 @@ impl OnLog for EquationsOnLog<'_> {
         Ok(Some((experiment.first + base + 1, (0..height).map(of_output).collect())))
     }
 
-    /// The innovations, each divided by its standard deviation. They are what a model without parameters that sees the same inputs leaves
-    /// of itself.
+    /// The innovations, each divided by its standard deviation.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let inputs = self.stored.inputs.len();
-        let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;
         let filtered = self.filtered()?;
         let each = filtered.iter().zip(&self.counted).zip(&self.stored.outputs);
         let each = each.map(|((filtered, counted), output)| {
             let standardised = &filtered.standardised;
-            let mut model =
-                PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, self.sample_time)?;
-            model.inputs.clone_from(&self.stored.inputs);
-            model.output = output.clone();
             let innovations = self.experiments.iter().flat_map(segments).map(|rows| {
                 let own: Vec<f64> =
                     standardised[rows.clone()].iter().map(|e| if e.is_nan() { 0.0 } else { *e }).collect();
@@ -378,16 +369,11 @@ impl OnLog for EquationsOnLog<'_> {
                 let counted = counted.iter().filter(inside).cloned().collect();
                 Innovations::alone(rows, counted, own)
             });
-            let innovations: Vec<Innovations> = innovations.collect();
-            let segments: Vec<Range<usize>> = self.experiments.iter().flat_map(segments).collect();
-            let record = Record {
-                output: standardised,
-                inputs: self.inputs.iter().map(Vec::as_slice).collect(),
-                past: vec![0; segments.len()],
-                segments,
-            };
-            Ok(Tested { model: Cow::Owned(model), record, innovations: Cow::Owned(innovations) })
+            let inputs = self.inputs.iter().map(Vec::as_slice).collect();
+            let record =
+                record_of(standardised, inputs, self.experiments.iter().flat_map(segments).collect());
+            Tested::errors(output, &self.stored.inputs, record, innovations.collect())
         });
-        each.collect()
+        Ok(each.collect())
     }
 }

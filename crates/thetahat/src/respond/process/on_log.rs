@@ -1,6 +1,5 @@
 //! A process beside a log.
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::OnceLock;
 
@@ -8,12 +7,9 @@ use thetahat_numerics::regression::Span;
 
 use super::held::{HeldLog, at_rest, held_logs, modes, sensitivities};
 use crate::Error;
-use crate::data::{Log, Record, Rows, measured};
-use crate::model::{Orders, Parts, PolynomialModel, ProcessModel, Signal};
-use crate::respond::{
-    Forecast, Horizon, InitialCondition, Innovations, Response,
-    on_log::{OnLog, Tested},
-};
+use crate::data::{Log, Rows, measured};
+use crate::model::{Parts, ProcessModel, Signal};
+use crate::respond::{Forecast, Horizon, InitialCondition, Response, on_log::OnLog, tested::Tested};
 
 /// A process beside a log of which its offsets were taken. Its errors do not depend on past outputs, so predictions are free runs.
 #[derive(Debug)]
@@ -181,29 +177,11 @@ impl OnLog for ProcessOnLog<'_> {
         (variance, mse.map(|mse| mse / variance))
     }
 
-    /// The errors, as a model without parameters that sees the same inputs leaves them.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
-        let inputs = self.model.inputs.len();
-        let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;
-        let mut alone =
-            PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, self.model.sample_time)?;
-        alone.inputs.clone_from(&self.model.inputs);
-        alone.output = self.model.output.clone();
         let start = self.natural_start(Horizon::FreeRun);
         let response = self.respond(Horizon::FreeRun, start)?.remove(0);
-        let innovations = response.counted.iter().map(|rows| {
-            let errors = rows.clone().map(|row| self.output[row] - response.values[row]).collect();
-            Innovations::alone(rows.clone(), vec![rows.clone()], errors)
-        });
-        let innovations: Vec<Innovations> = innovations.collect();
-        let segments: Vec<Range<usize>> = response.counted.clone();
-        let record = Record {
-            output: self.output,
-            inputs: self.inputs.iter().map(Vec::as_slice).collect(),
-            past: vec![0; segments.len()],
-            segments,
-        };
-        Ok(vec![Tested { model: Cow::Owned(alone), record, innovations: Cow::Owned(innovations) }])
+        let (model, inputs) = (self.model, self.inputs.iter().map(Vec::as_slice).collect());
+        Ok(vec![Tested::of_response(&model.output, &model.inputs, self.output, inputs, &response)])
     }
 
     /// Predictions reach as far as the inputs.

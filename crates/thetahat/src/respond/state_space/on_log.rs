@@ -9,12 +9,13 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::Recursion;
 use super::covariance::{StateCovariance, added};
 use crate::Error;
-use crate::data::{JointRecord, Log, Record, Rows, measured};
-use crate::model::{Orders, PolynomialModel, Signal, StateSpace, StateSpaceModel};
+use crate::data::{JointRecord, Log, Rows, measured};
+use crate::model::{Signal, StateSpace, StateSpaceModel};
 use crate::respond::{
     Forecast, Horizon, InitialCondition, Innovations, Response,
-    on_log::{OnLog, Tested, known_ahead},
+    on_log::{OnLog, known_ahead},
     predict::check_steps,
+    tested::{Tested, record_of},
 };
 
 /// A state-space model beside a log of which its offsets were taken.
@@ -417,22 +418,15 @@ impl OnLog for StateSpaceOnLog<'_> {
         if count == 0.0 { (variance, None) } else { (expected / count, mse.map(|_| ratio / count)) }
     }
 
-    /// The errors of each output, as a model without parameters that sees the same inputs leaves them. Where a state is uncertain they are as
-    /// many times smaller as their deviation is larger: those of all rows are then alike.
+    /// Where a state is uncertain errors are as many times smaller as their deviation is larger: those of all rows are then alike.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
         let (model, record) = (&*self.model, &self.ahead);
         let found = self.innovations(self.natural());
         let added = self.added(1);
-        let inputs = model.inputs.len();
-        let orders = Orders::arx(0, &vec![1; inputs], &vec![0; inputs])?;
         let each = model.outputs.iter().enumerate().map(|(output, signal)| {
-            let mut alone =
-                PolynomialModel::from_parameters(&orders, &vec![0.0; inputs], None, 1.0, model.sample_time)?;
-            alone.inputs.clone_from(&model.inputs);
-            alone.output = signal.clone();
             let measured_here = record.outputs[output];
             let variance = model.noise_covariance[output][output];
-            let innovations: Vec<Innovations> = (self.segments.iter().zip(&found.errors))
+            let innovations = (self.segments.iter().zip(&found.errors))
                 .map(|(rows, errors)| {
                     let mut errors = errors[output].clone();
                     if let Some(added) = &added {
@@ -448,15 +442,10 @@ impl OnLog for StateSpaceOnLog<'_> {
                     Innovations::alone(rows.clone(), measured(measured_here, rows), errors)
                 })
                 .collect();
-            let record = Record {
-                output: measured_here,
-                inputs: record.inputs.clone(),
-                past: vec![0; self.segments.len()],
-                segments: self.segments.clone(),
-            };
-            Ok(Tested { model: Cow::Owned(alone), record, innovations: Cow::Owned(innovations) })
+            let record = record_of(measured_here, record.inputs.clone(), self.segments.clone());
+            Tested::errors(signal, &model.inputs, record, innovations)
         });
-        each.collect()
+        Ok(each.collect())
     }
 
     fn forecast(

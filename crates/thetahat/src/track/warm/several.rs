@@ -4,10 +4,8 @@ use thetahat_core::nalgebra::DMatrix;
 
 use super::{offset_level, unusable};
 use crate::Error;
-use crate::estimate::{Coupling, Procedure, VectorArxOutcome};
-use crate::model::{
-    Entry, Model, Orders, Parameter, Quantity, StateSpace, StateSpaceMatrix, StateSpaceModel,
-};
+use crate::estimate::{Coupling, VectorArxOutcome};
+use crate::model::{Entry, Orders, Parameter, Quantity, StateSpace, StateSpaceMatrix, StateSpaceModel};
 use crate::report::Report;
 use crate::track::checks::check;
 use crate::track::equation::{equation, names};
@@ -41,12 +39,10 @@ impl Tracker {
     /// Those of `from_report`; [`Error::Report`] if the report is of another kind of model, or its matrices are not those of its A and B, as
     /// after a reduction; [`Error::Argument`] if there is no such output.
     pub fn from_report_of(report: &Report, output: usize, plan: &TrackPlan) -> Result<Self, Error> {
-        let model = match &report.model {
-            Model::StateSpace(model) if model.outputs.len() > 1 || output > 0 => model,
-            _ => return Self::from_report(report, plan),
-        };
+        let own = report.model.as_state_space().filter(|model| model.outputs.len() > 1 || output > 0);
+        let Some(model) = own else { return Self::from_report(report, plan) };
         super::check_start(plan)?;
-        let Procedure::VectorArx(outcome) = &report.estimation.procedure else {
+        let Some(outcome) = report.estimation.procedure.vector_arx() else {
             return Err(Error::report("of several outputs only an ARX model can be tracked; fit one"));
         };
         model.check()?;

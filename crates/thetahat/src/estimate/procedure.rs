@@ -1,0 +1,207 @@
+//! How an estimate was found, and what follows from that for those who use it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::Stopped;
+use thetahat_numerics::regression::Solver;
+
+use super::{
+    ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, ProcessOutcome, RegularisedOutcome,
+    RobustOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
+};
+
+/// How an estimate was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "method", rename_all = "kebab-case")]
+pub enum Procedure {
+    /// In one step, as the predictor is linear in the parameters.
+    LeastSquares {
+        /// How the least-squares problem was solved.
+        solver: Solver,
+    },
+    /// By instrumental variables in four stages: A and B, whatever the colour of the noise.
+    InstrumentalVariables {
+        /// The order of the autoregression that the signals of the last stage are filtered by.
+        filter_order: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By refined instrumental variables: B and F, whatever the colour of the noise.
+    RefinedInstrumentalVariables {
+        /// Iterations done, from the best start.
+        iterations: usize,
+        /// Why they stopped.
+        stopped: Stopped,
+        /// The initial conditions that were estimated.
+        initial_conditions: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By a search for the least sum of squared prediction errors.
+    PredictionError(SearchOutcome),
+    /// By regularised least squares, with the kernel of the largest marginal likelihood.
+    Regularised(RegularisedOutcome),
+    /// By convex optimization.
+    Constrained(ConvexOutcome),
+    /// By a search for the least sum of a loss that does not follow wild samples.
+    Robust(RobustOutcome),
+    /// By a search for the largest likelihood of all measured outputs.
+    ExactLikelihood(LikelihoodOutcome),
+    /// The largest likelihood of the innovations of a model in equations.
+    InnovationsLikelihood(EquationsOutcome),
+    /// In one step for functions of the regressors, which were chosen one after the other.
+    ForwardRegression(MapsOutcome),
+    /// In one step for local models, whose boxes were split one after the other.
+    Splits(MapsOutcome),
+    /// By the samples themselves.
+    Neighbours(MapsOutcome),
+    /// By a search for all numbers of a map, from several starts.
+    Training(MapsOutcome),
+    /// By a search for the least errors of the free run of a process in continuous time.
+    FreeRun(ProcessOutcome),
+    /// By a search for the least errors of the frequency response of a process.
+    FrequencyResponse(ProcessOutcome),
+    /// By a subspace method: the states first, then the matrices.
+    Subspace(SubspaceOutcome),
+    /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
+    VectorArx(VectorArxOutcome),
+}
+
+/// Which distribution the tests of residuals have where the model is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum NullDistribution {
+    /// The parameters made the squares of these residuals least.
+    Fitted,
+    /// The parameters were fitted to the same samples by instrumental variables.
+    Instrumental,
+    /// The parameters come from other samples, or the tests do not know what the errors owe to them.
+    Known,
+}
+
+impl Procedure {
+    /// The distribution of the tests of residuals on the rows of the fit.
+    pub(crate) fn null_distribution(&self) -> NullDistribution {
+        match self {
+            Self::LeastSquares { .. }
+            | Self::RefinedInstrumentalVariables { .. }
+            | Self::PredictionError(_)
+            | Self::Regularised(_)
+            | Self::Constrained(_)
+            | Self::Robust(_)
+            | Self::ExactLikelihood(_) => NullDistribution::Fitted,
+            Self::InstrumentalVariables { .. } => NullDistribution::Instrumental,
+            // The tests have no derivatives of these errors by the parameters.
+            Self::InnovationsLikelihood(_)
+            | Self::ForwardRegression(_)
+            | Self::Splits(_)
+            | Self::Neighbours(_)
+            | Self::Training(_)
+            | Self::FreeRun(_)
+            | Self::FrequencyResponse(_)
+            | Self::Subspace(_)
+            | Self::VectorArx(_) => NullDistribution::Known,
+        }
+    }
+
+    /// Whether it was by instrumental variables, which say nothing of the noise.
+    pub fn is_instrumental(&self) -> bool {
+        matches!(self, Self::InstrumentalVariables { .. } | Self::RefinedInstrumentalVariables { .. })
+    }
+
+    /// The search for the parameters of polynomials, if there was one whose cost is a sum over prediction errors.
+    pub fn search(&self) -> Option<&SearchOutcome> {
+        match self {
+            Self::PredictionError(search) => Some(search),
+            Self::Robust(outcome) => Some(&outcome.search),
+            Self::ExactLikelihood(outcome) => Some(&outcome.search),
+            Self::LeastSquares { .. }
+            | Self::InstrumentalVariables { .. }
+            | Self::RefinedInstrumentalVariables { .. }
+            | Self::Regularised(_)
+            | Self::Constrained(_)
+            | Self::InnovationsLikelihood(_)
+            | Self::ForwardRegression(_)
+            | Self::Splits(_)
+            | Self::Neighbours(_)
+            | Self::Training(_)
+            | Self::FreeRun(_)
+            | Self::FrequencyResponse(_)
+            | Self::Subspace(_)
+            | Self::VectorArx(_) => None,
+        }
+    }
+
+    /// How many initial conditions of polynomials were estimated with the parameters.
+    pub(crate) fn initial_conditions(&self) -> usize {
+        match self {
+            Self::RefinedInstrumentalVariables { initial_conditions, .. } => *initial_conditions,
+            Self::Constrained(outcome) => {
+                outcome.search.as_ref().map_or(0, |search| search.initial_conditions)
+            }
+            _ => self.search().map_or(0, |search| search.initial_conditions),
+        }
+    }
+
+    /// The search for the largest likelihood of all measured outputs, if it was that.
+    pub fn exact_likelihood(&self) -> Option<&LikelihoodOutcome> {
+        if let Self::ExactLikelihood(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// What was made small, and what bounds were kept, if it was by convex optimization.
+    pub fn constrained(&self) -> Option<&ConvexOutcome> {
+        if let Self::Constrained(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// The kernel of regularised least squares, if it was by that.
+    pub fn regularised(&self) -> Option<&RegularisedOutcome> {
+        if let Self::Regularised(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// How a model in equations was found.
+    pub fn equations(&self) -> Option<&EquationsOutcome> {
+        if let Self::InnovationsLikelihood(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// How a process was found from a log.
+    pub fn free_run(&self) -> Option<&ProcessOutcome> {
+        if let Self::FreeRun(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// How a process was found from a measured frequency response.
+    pub fn frequency_response(&self) -> Option<&ProcessOutcome> {
+        if let Self::FrequencyResponse(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// How a process was found, from whatever.
+    pub fn process(&self) -> Option<&ProcessOutcome> {
+        self.free_run().or(self.frequency_response())
+    }
+
+    /// How a state-space model was found, if it was by a subspace method.
+    pub fn subspace(&self) -> Option<&SubspaceOutcome> {
+        if let Self::Subspace(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// How an ARX model of several outputs was found.
+    pub fn vector_arx(&self) -> Option<&VectorArxOutcome> {
+        if let Self::VectorArx(outcome) = self { Some(outcome) } else { None }
+    }
+
+    /// The choices of the functions of a nonlinear ARX model.
+    pub(crate) fn maps(&self) -> Option<&MapsOutcome> {
+        if let Self::ForwardRegression(maps)
+        | Self::Splits(maps)
+        | Self::Neighbours(maps)
+        | Self::Training(maps) = self
+        {
+            Some(maps)
+        } else {
+            None
+        }
+    }
+
+    /// The choices of the functions of a nonlinear ARX model, one for each output; none of other models.
+    pub fn terms(&self) -> &[TermsOutcome] {
+        self.maps().map_or(&[], |outcome| &outcome.maps)
+    }
+}

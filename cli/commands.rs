@@ -25,7 +25,6 @@ mod spectrum;
 mod state_space;
 mod step;
 mod stored;
-pub(crate) mod summary;
 mod track;
 mod transient;
 mod tune;

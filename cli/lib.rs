@@ -46,14 +46,9 @@ pub use binding::{
     tuning_of, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
-pub use commands::summary::{
-    comparison, control, experiment_design, filtered, inspection, response, step_test, table, topics,
-    tracking, tuning, validation,
-};
 pub use commands::{Journal, Making, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;
-pub use wrap::WIDTH;
 
 /// Runs the program on its arguments, the program's name first, and gives its exit code: 0 done, 2 usage, 3 bad data,
 /// 4 the data cannot determine the model, 5 input/output, 6 a model does not meet what was required, 7 an alarm

@@ -2,6 +2,7 @@
 
 use std::io::Write;
 
+use thetahat::present::tables::wrapped;
 use thetahat::text::message;
 
 use crate::options::with_options;
@@ -20,7 +21,7 @@ pub(crate) fn note(words: &str) {
 /// Says something that may be long: on a terminal it is broken between words.
 pub(crate) fn tell(line: &str) {
     match wrap::stderr_width() {
-        Some(width) => say(&wrap::wrapped(line, width)),
+        Some(width) => say(&wrapped(line, width)),
         None => say(line),
     }
 }

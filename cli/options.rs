@@ -3,7 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 /// The arguments of the libraries that are options, by the name that both have.
-pub(crate) const OPTIONS: [&str; 98] = [
+pub(crate) const OPTIONS: [&str; 99] = [
     "alarm",
     "alpha",
     "alphas",
@@ -28,6 +28,7 @@ pub(crate) const OPTIONS: [&str; 98] = [
     "feedthrough",
     "focus",
     "forgetting",
+    "format",
     "frequencies",
     "future",
     "gain",

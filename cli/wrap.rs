@@ -1,12 +1,15 @@
 //! Lines no wider than the terminal that shows them.
 
 use std::io;
+use std::path::Path;
 
 use terminal_size::{Width, terminal_size_of};
-use textwrap::{Options, WordSplitter};
+use thetahat::present::Layout;
+
+use crate::options::with_options;
 
 /// The width of what is read from a file or a pipe, in columns.
-pub const WIDTH: usize = 80;
+const WIDTH: usize = 80;
 
 /// A narrower terminal is not written for.
 const NARROWEST: usize = 20;
@@ -17,7 +20,7 @@ pub(crate) fn stderr_width() -> Option<usize> {
 }
 
 /// The width for tables on standard output.
-pub(crate) fn stdout_width() -> usize {
+fn stdout_width() -> usize {
     terminal_size_of(io::stdout()).and_then(usable).unwrap_or(WIDTH)
 }
 
@@ -26,12 +29,22 @@ fn usable((Width(columns), _): (Width, terminal_size::Height)) -> Option<usize> 
     (columns > 0).then(|| usize::from(columns).max(NARROWEST))
 }
 
-/// Breaks lines between words. A word that is too long, such as the name of a file, stays whole.
-pub(crate) fn wrapped(text: &str, width: usize) -> String {
-    let options = Options::new(width)
-        .subsequent_indent("  ")
-        .break_words(false)
-        // Options begin with hyphens.
-        .word_splitter(WordSplitter::NoHyphenation);
-    textwrap::fill(text, options)
+/// The layout of what goes to a file, or to standard output where that is -.
+pub(crate) fn layout_of(out: &Path) -> Layout {
+    layout(if out == Path::new("-") { stdout_width() } else { WIDTH })
+}
+
+/// The layout of tables on standard output.
+pub(crate) fn stdout_layout() -> Layout {
+    layout(stdout_width())
+}
+
+/// The layout of tables on standard error.
+pub(crate) fn stderr_layout() -> Layout {
+    layout(stderr_width().unwrap_or(WIDTH))
+}
+
+/// Text of so many columns, with arguments as options.
+fn layout(width: usize) -> Layout {
+    Layout { width, spelled: with_options }
 }

@@ -56,7 +56,7 @@ const LIBRARY: House = House {
         &["control", "design", "step_test", "tune"],
         &["report"],
         &["filter", "track"],
-        &["export"],
+        &["export", "present"],
     ],
 };
 
@@ -80,7 +80,8 @@ const TABLE: House = House {
 const COMMAND_LINE: House = House {
     source: "cli",
     floors: &[
-        &["main", "memory", "options", "shell", "threads", "wrap"],
+        &["main", "memory", "options", "shell", "threads"],
+        &["wrap"],
         &["messages"],
         &["failure"],
         &["interrupt"],

@@ -8,10 +8,8 @@ use serde_json::{Value, json};
 use thetahat::data::{Channel, Detrend, Log, Recording, Source, Times};
 use thetahat::inspect::{Inspection, InspectionPlan, inspect};
 use thetahat::model::{Model, Orders, PolynomialModel};
-use thetahat::report::{
-    Plan, Report, Validated, ValidationPlan, comparison_page, fit_page, identify, inspection_page, validate,
-    validation_page,
-};
+use thetahat::present::{comparison_page, fit_page, inspection_page, validation_page};
+use thetahat::report::{Plan, Report, Validated, ValidationPlan, identify, validate};
 
 use crate::browser::Browser;
 use crate::fit_reference::folder_with;

@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use thetahat::Document;
+use thetahat::present::Layout;
 
 use crate::args::{ClosedLoopArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::{WIDTH, stdout_width};
+use crate::wrap::layout_of;
 
 /// Writes the document, the responses and the table, as far as they are asked for, and says the warnings.
 pub(crate) fn write<D: Document>(
@@ -16,7 +17,7 @@ pub(crate) fn write<D: Document>(
     found: &D,
     warnings: &[String],
     responses: impl FnOnce(&Path, &D) -> Result<(), Failure>,
-    table: impl FnOnce(&D, usize) -> String,
+    table: impl FnOnce(&D, Layout) -> String,
 ) -> Result<(), Failure> {
     let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
     if let Some(path) = &arguments.document {
@@ -29,10 +30,10 @@ pub(crate) fn write<D: Document>(
         warn(warning);
     }
     // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    let layout = layout_of(&arguments.out);
     let text = match arguments.format {
         FormatArgument::Json => json,
-        FormatArgument::Table => table(found, width),
+        FormatArgument::Table => table(found, layout),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }

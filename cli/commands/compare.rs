@@ -1,17 +1,18 @@
 //! `thetahat compare`: several stored models side by side on a log.
 
 use thetahat::Document;
-use thetahat::report::{Report, Validated, compare as compared, comparison_page};
+use thetahat::present::{comparison_page, tables};
+use thetahat::report::{Report, Validated, compare as compared};
 
 use super::search::Telling;
+use super::stored;
 use super::validate::{loaded, one, print};
-use super::{stored, summary};
 use crate::args::CompareArguments;
 use crate::failure::Failure;
 use crate::job::EvaluationJob;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
@@ -44,5 +45,5 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     for (path, model) in arguments.reports.iter().zip(&comparison.models) {
         model.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
     }
-    print(evaluation, &json, || summary::comparison(&comparison, stdout_width()))
+    print(evaluation, &json, || tables::comparison(&comparison, stdout_layout()))
 }

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use thetahat::control::{Control, ControlPlan, control as controlled};
 use thetahat::model::Model;
+use thetahat::present::tables;
 
-use super::{closed_loop, stored, summary};
+use super::{closed_loop, stored};
 use crate::args::ControlArguments;
 use crate::failure::Failure;
 use crate::job::control_plan;
@@ -15,7 +16,7 @@ pub(crate) fn control(arguments: &ControlArguments) -> Result<(), Failure> {
     // What is wrong with an option is said before anything is read.
     let plan = control_plan(arguments)?;
     let found = designed(&plan, &stored::model(&arguments.report)?, &arguments.report)?;
-    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, summary::control)
+    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, tables::control)
 }
 
 /// The controller for a model, which messages name by a path.

@@ -3,14 +3,15 @@
 use std::path::Path;
 
 use thetahat::model::{Hold, TimeBase};
+use thetahat::present::tables;
 use thetahat::{Document, Error};
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::{ConvertArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 pub(crate) fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     let to: TimeBase = arguments.to.parse().map_err(|error| Failure::option(&error))?;
@@ -33,6 +34,6 @@ pub(crate) fn convert(arguments: &ConvertArguments) -> Result<(), Failure> {
     match arguments.format {
         _ if arguments.out.as_deref() == Some(Path::new("-")) => Ok(()),
         FormatArgument::Json => output::print(&json),
-        FormatArgument::Table => output::print(&summary::converted(&converted, stdout_width())),
+        FormatArgument::Table => output::print(&tables::converted(&converted, stdout_layout())),
     }
 }

@@ -2,16 +2,17 @@
 
 use std::fs;
 use thetahat::Document;
+use thetahat::present::tables;
 
 use clap::Parser;
 
-use super::{fit, summary};
+use super::fit;
 use crate::args::{Arguments, Command, DemoArguments};
 use crate::failure::Failure;
 use crate::job::FitJob;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 /// A log of a DC motor: its columns are t, u and y. Made by the program beside it.
 pub const LOG: &str = include_str!("../demo/dc_motor.csv");
@@ -42,6 +43,6 @@ pub(crate) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
         log.display(),
         OPTIONS.join(" "),
         report.display(),
-        summary::table(&found, stdout_width())
+        tables::report(&found, stdout_layout())
     ))
 }

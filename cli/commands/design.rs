@@ -5,14 +5,15 @@ use std::path::Path;
 use thetahat::Document;
 use thetahat::design::{ExperimentDesign, SignalFigures, SignalPlan, TestSignal, compare_signals};
 use thetahat::model::Model;
+use thetahat::present::tables;
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::{DesignArguments, FormatArgument};
 use crate::failure::Failure;
 use crate::job::DesignJob;
 use crate::messages::tell;
 use crate::output;
-use crate::wrap::{WIDTH, stdout_width};
+use crate::wrap::layout_of;
 
 pub(crate) fn design(arguments: &DesignArguments) -> Result<(), Failure> {
     let job = DesignJob::resolve(arguments)?;
@@ -48,7 +49,7 @@ fn signal(arguments: &DesignArguments, plan: &SignalPlan) -> Result<(), Failure>
         }
         Ok(())
     })?;
-    for line in summary::test_signal(plan, &signal, &names, &figures) {
+    for line in tables::test_signal(plan, &signal, &names, &figures) {
         tell(&line);
     }
     Ok(())
@@ -58,10 +59,10 @@ fn signal(arguments: &DesignArguments, plan: &SignalPlan) -> Result<(), Failure>
 fn compare(arguments: &DesignArguments, job: &DesignJob, report: &Path) -> Result<(), Failure> {
     let found = compared_signals(arguments, job, &stored::model(report)?, report)?;
     // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    let layout = layout_of(&arguments.out);
     let text = match arguments.format {
         FormatArgument::Json => found.to_json().map_err(|error| Failure::data(error.to_string()))?,
-        FormatArgument::Table => summary::experiment_design(&found, width),
+        FormatArgument::Table => tables::experiment_design(&found, layout),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }

@@ -5,9 +5,10 @@ mod columns;
 use thetahat::Document;
 use thetahat::figures::fixed;
 use thetahat::filter::{FilterSummary, StateFilter, StateModel};
+use thetahat::present::tables;
 use thetahat::report::Report;
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::FilterArguments;
 use crate::failure::Failure;
 use crate::interrupt;
@@ -17,7 +18,7 @@ use crate::live::{Live, Next};
 use crate::log;
 use crate::messages::{say, warn};
 use crate::output;
-use crate::wrap::{WIDTH, stderr_width};
+use crate::wrap::stderr_layout;
 use columns::Columns;
 
 pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
@@ -46,8 +47,8 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         warn(&format!("{}: {word}", run.name));
     }
     if !job.lines.quiet {
-        let width = stderr_width().unwrap_or(WIDTH);
-        say(summary::filtered(&run.filter.summary(), &run.live.faults(), width).trim_end());
+        let layout = stderr_layout();
+        say(tables::filtered(&run.filter.summary(), &run.live.faults(), layout).trim_end());
     }
     if stopped { Err(Failure::interrupted()) } else { Ok(()) }
 }

@@ -5,22 +5,21 @@ use std::path::{Path, PathBuf};
 
 use thetahat::Document;
 use thetahat::data::{Log, Rows, Source};
-use thetahat::report::{
-    Report, Validated, ValidationPlan, fit_page, held_out_runs, identify_monitored, validate,
-};
+use thetahat::present::{fit_page, tables};
+use thetahat::report::{Report, Validated, ValidationPlan, held_out_runs, identify_monitored, validate};
 
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
 use super::pieces::PiecesJob;
 use super::search::{Identified, Telling};
-use super::{grey_box, narx, process, state_space, stored, summary};
+use super::{grey_box, narx, process, state_space, stored};
 use crate::args::{EachArguments, FitArguments, FormatArgument, MapArgument};
 use crate::failure::Failure;
 use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
 use crate::log;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     if arguments.each.each {
@@ -44,7 +43,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
         // Standard output holds one document.
         _ if outputs.into_iter().flatten().any(|path| path == Path::new("-")) => Ok(()),
         FormatArgument::Json => output::print(&json),
-        FormatArgument::Table => output::print(&summary::table(&report, stdout_width())),
+        FormatArgument::Table => output::print(&tables::report(&report, stdout_layout())),
     }
 }
 

@@ -5,19 +5,18 @@ use std::path::Path;
 
 use thetahat::data::{Finding, Recording, Source, Times};
 use thetahat::inspect::{Inspection, InspectionPlan, PiecewiseInspection, TopicList};
-use thetahat::report::inspection_page;
+use thetahat::present::{inspection_page, tables};
 use thetahat::{Document, text};
 use thetahat_table::Reader;
 
 use super::each::{Done, each};
 use super::experiments::usual_inputs;
-use super::summary;
 use crate::args::{EachArguments, FormatArgument, InspectArguments};
 use crate::failure::Failure;
 use crate::job::InspectJob;
 use crate::log::{self, Recorded};
 use crate::output;
-use crate::wrap::{WIDTH, stdout_width};
+use crate::wrap::layout_of;
 
 pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Failure> {
     if arguments.each.each {
@@ -42,7 +41,7 @@ pub(crate) fn inspect(arguments: &InspectArguments, line: &str) -> Result<(), Fa
     }
     let text = match arguments.format {
         FormatArgument::Json => inspection.to_json().map_err(|error| Failure::data(error.to_string()))?,
-        FormatArgument::Table => summary::inspection(&inspection, width(arguments)),
+        FormatArgument::Table => tables::inspection(&inspection, layout_of(&arguments.out)),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }
@@ -56,14 +55,9 @@ fn list(topics: &TopicList, arguments: &InspectArguments) -> Result<(), Failure>
     }
     let text = match arguments.format {
         FormatArgument::Json => topics.to_json().map_err(|error| Failure::data(error.to_string()))?,
-        FormatArgument::Table => summary::topics(topics, width(arguments)),
+        FormatArgument::Table => tables::topics(topics, layout_of(&arguments.out)),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
-}
-
-/// What goes into a file does not depend on the terminal.
-fn width(arguments: &InspectArguments) -> usize {
-    if arguments.out == Path::new("-") { stdout_width() } else { WIDTH }
 }
 
 /// What inspections of many logs have in common, in words that differ where they do.

@@ -1,13 +1,14 @@
 //! `thetahat reduce`: a model with fewer states.
 
 use thetahat::Document;
+use thetahat::present::tables;
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::ReduceArguments;
 use crate::failure::Failure;
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 pub(crate) fn reduce(arguments: &ReduceArguments) -> Result<(), Failure> {
     let path = &arguments.report;
@@ -24,6 +25,6 @@ pub(crate) fn reduce(arguments: &ReduceArguments) -> Result<(), Failure> {
         return output::write(&arguments.out, |file| file.write_all(json.as_bytes()));
     }
     output::write(&arguments.out, |file| {
-        file.write_all(summary::hankel_singular_values(&values, stdout_width()).as_bytes())
+        file.write_all(tables::hankel_singular_values(&values, stdout_layout()).as_bytes())
     })
 }

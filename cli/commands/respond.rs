@@ -4,10 +4,11 @@ use std::io::Write;
 use std::path::Path;
 
 use thetahat::data::{Detrend, Log, Source};
+use thetahat::present::tables;
 use thetahat::report::{Applied, sample};
 use thetahat::respond::{Drawn, Draws, Horizon, InitialCondition};
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::{PredictArguments, RespondArguments, SimulateArguments};
 use crate::failure::Failure;
 use crate::job::{LogJob, parsed, rows};
@@ -118,7 +119,7 @@ fn respond(
             Some(fit) if fit.samples == 0 && !output.predicted.iter().any(|value| value.is_finite()) => {
                 warn(&format!("{of}no row could be predicted: the segments without a gap are too short"))
             }
-            Some(fit) => tell(&format!("{of}{}", summary::figure(fit))),
+            Some(fit) => tell(&format!("{of}{}", tables::figure(fit))),
             None => {}
         }
         // Squares of numbers always have a mean.

@@ -4,16 +4,15 @@ use std::path::Path;
 
 use thetahat::Document;
 use thetahat::model::Quantity;
-use thetahat::report::response_page;
+use thetahat::present::{response_page, tables};
 use thetahat::spectrum::{MeasuredResponse, spectrum as estimated};
 
 use super::experiments::{Experiments, Wanted, read};
-use super::summary;
 use crate::args::{ResponseFormatArgument, SpectrumArguments};
 use crate::failure::Failure;
 use crate::job::SpectrumJob;
 use crate::messages::warn;
-use crate::wrap::{WIDTH, stdout_width};
+use crate::wrap::layout_of;
 use crate::{log, output};
 
 pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), Failure> {
@@ -23,7 +22,7 @@ pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), 
         output::page(path, &response_page(&found, &[], line))?;
     }
     // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    let layout = layout_of(&arguments.out);
     match arguments.format {
         ResponseFormatArgument::Csv => {
             // A table and a document have their warnings in them.
@@ -32,7 +31,7 @@ pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), 
         }
         ResponseFormatArgument::Json => output::write(&arguments.out, |file| file.write_all(json.as_bytes())),
         ResponseFormatArgument::Table => {
-            let table = summary::response(&found, width);
+            let table = tables::response(&found, layout);
             output::write(&arguments.out, |file| file.write_all(table.as_bytes()))
         }
     }

@@ -5,17 +5,17 @@ use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 use thetahat::data::Log;
-use thetahat::report::step_test_page;
+use thetahat::present::{step_test_page, tables};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::{StepTest, sine_test, step_test};
 use thetahat::{Document, is_document};
 
 use super::experiments::{Experiments, Wanted, read};
-use super::{stored, summary, transient};
+use super::{stored, transient};
 use crate::args::{FormatArgument, StepArguments};
 use crate::failure::Failure;
 use crate::job::StepTestJob;
-use crate::wrap::{WIDTH, stdout_width};
+use crate::wrap::layout_of;
 use crate::{log, output};
 
 /// The first bytes of a file say what it is.
@@ -112,10 +112,10 @@ fn written(
         output::write(path, |file| file.write_all(json.as_bytes()))?;
     }
     // What goes into a file does not depend on the terminal.
-    let width = if arguments.out == Path::new("-") { stdout_width() } else { WIDTH };
+    let layout = layout_of(&arguments.out);
     let text = match arguments.format {
         Some(FormatArgument::Json) => json,
-        Some(FormatArgument::Table) | None => summary::step_test(found, width),
+        Some(FormatArgument::Table) | None => tables::step_test(found, layout),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
 }

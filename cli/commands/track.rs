@@ -11,9 +11,10 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use thetahat::Document;
+use thetahat::present::tables;
 use thetahat::report::Report;
 
-use super::{stored, summary};
+use super::stored;
 use crate::args::TrackArguments;
 use crate::failure::Failure;
 use crate::job::{Clock, TrackJob};
@@ -23,7 +24,7 @@ use crate::log;
 use crate::messages::{say, warn};
 use crate::output;
 use crate::replace::Held;
-use crate::wrap::{WIDTH, stderr_width};
+use crate::wrap::stderr_layout;
 use columns::Columns;
 use session::{Memory, Row, Session};
 use state::{Place, RowPlace, State};
@@ -243,9 +244,9 @@ impl<'a> Run<'a> {
             output::write(path, |file| file.write_all(json.as_bytes()))?;
         }
         if !self.job.lines.quiet {
-            let width = stderr_width().unwrap_or(WIDTH);
+            let layout = stderr_layout();
             let watched = self.job.is_watched();
-            say(summary::tracking(&summary, &self.live.faults(), watched, width).trim_end());
+            say(tables::tracking(&summary, &self.live.faults(), watched, layout).trim_end());
         }
         Ok(())
     }

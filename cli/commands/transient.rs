@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use thetahat::model::{LinearModel, Model, Quantity};
-use thetahat::report::{Transient, transient_page};
+use thetahat::present::{Transient, transient_page};
 
 use super::stored;
 use crate::args::TransientArguments;

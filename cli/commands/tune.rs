@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use thetahat::model::Model;
-use thetahat::report::tuning_page;
+use thetahat::present::{tables, tuning_page};
 use thetahat::tune::{Controller, Tuning, TuningPlan, tune as tuned};
 
-use super::{closed_loop, stored, summary};
+use super::{closed_loop, stored};
 use crate::args::{ControllerArgument, TuneArguments};
 use crate::failure::Failure;
 use crate::output;
@@ -16,7 +16,7 @@ pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure>
     if let Some(path) = &arguments.html {
         output::page(path, &tuning_page(&found, line))?;
     }
-    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, summary::tuning)
+    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, tables::tuning)
 }
 
 /// The settings for a model, which messages name by a path.

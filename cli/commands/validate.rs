@@ -4,20 +4,19 @@ use std::cell::RefCell;
 use std::path::Path;
 
 use thetahat::Document;
-use thetahat::report::{
-    Report, Requirement, Validated, Validation, ValidationPlan, validate as validated, validation_page,
-};
+use thetahat::present::{tables, validation_page};
+use thetahat::report::{Report, Requirement, Validated, Validation, ValidationPlan, validate as validated};
 
 use super::each::{Done, each};
 use super::search::Telling;
-use super::{stored, summary};
+use super::stored;
 use crate::args::{EachArguments, EvaluationArguments, FormatArgument, ValidateArguments};
 use crate::failure::Failure;
 use crate::job::{EvaluationJob, only};
 use crate::log::{self, Clocks, Loaded};
 use crate::messages::warn;
 use crate::output;
-use crate::wrap::stdout_width;
+use crate::wrap::stdout_layout;
 
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
@@ -47,7 +46,7 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
         warn(warning);
     }
     print(evaluation, &json, || {
-        summary::validation(validation, &requirements, job.plan.alpha, stdout_width())
+        tables::validation(validation, &requirements, job.plan.alpha, stdout_layout())
     })?;
 
     unmet(&arguments.report, validation, &requirements, &job).map_or(Ok(()), Err)

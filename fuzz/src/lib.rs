@@ -19,10 +19,13 @@ use thetahat::filter::{Estimator, FilterSummary, StateFilter, StateModel};
 use thetahat::inspect::{Inspection, TopicList};
 use thetahat::model::{GreyBox, Hold, LinearModel, Model};
 use thetahat::optimize::Search;
+use thetahat::present::{
+    Transient, comparison_page, fit_page, response_page, step_test_page, transient_page, tuning_page,
+    validation_page,
+};
 use thetahat::report::{
-    Comparison, EquationsPlan, NormalEquations, Report, Transient, Validation, ValidationPlan, compare,
-    comparison_page, fit_equations, fit_page, response_page, sample, step_test_page, transient_page,
-    tuning_page, validate, validation_page,
+    Comparison, EquationsPlan, NormalEquations, Report, Validation, ValidationPlan, compare, fit_equations,
+    sample, validate,
 };
 use thetahat::respond::{Draws, Horizon, InitialCondition, logarithmic_frequencies};
 use thetahat::spectrum::MeasuredResponse;

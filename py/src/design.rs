@@ -7,6 +7,7 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::design::{SignalFigures, TestSignal};
+use thetahat::present::tables;
 
 use crate::error;
 use crate::model::Model;
@@ -59,7 +60,7 @@ pub(crate) fn compare_signals(
     let found = awaited(py, move |_| thetahat_cli::compare_signals(&options, &model))?
         .map_err(|failure| error::program(py, &failure))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::experiment_design(&found, thetahat_cli::WIDTH)))
+    Ok((json, tables::experiment_design(&found, error::layout())))
 }
 
 /// PI and PID settings for a process: the document that `thetahat tune` writes, and its table.
@@ -73,7 +74,7 @@ pub(crate) fn tune(
     let found = awaited(py, move |_| thetahat_cli::tuning_of(&options, &model))?
         .map_err(|failure| error::program(py, &failure))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::tuning(&found, thetahat_cli::WIDTH)))
+    Ok((json, tables::tuning(&found, error::layout())))
 }
 
 /// A controller for a model: the document that `thetahat control` writes, and its table.
@@ -87,5 +88,5 @@ pub(crate) fn control(
     let found = awaited(py, move |_| thetahat_cli::controller_of(&options, &model))?
         .map_err(|failure| error::program(py, &failure))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::control(&found, thetahat_cli::WIDTH)))
+    Ok((json, tables::control(&found, error::layout())))
 }

@@ -5,6 +5,7 @@ use std::io;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyMemoryError, PyValueError};
 use pyo3::prelude::*;
+use thetahat::present::Layout;
 
 create_exception!(
     thetahat,
@@ -78,6 +79,11 @@ fn undetermined(py: Python<'_>, message: String, parameters: Vec<String>) -> PyE
         Ok(()) => error,
         Err(other) => other,
     }
+}
+
+/// Tables of text in which arguments have their names here.
+pub(crate) fn layout() -> Layout {
+    Layout { spelled: in_python, ..Layout::default() }
 }
 
 /// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat::inspect::{Inspection, InspectionPlan};
+use thetahat::present::tables;
 use thetahat::report::{Report, Requirement, Validated};
 use thetahat::spectrum::MeasuredResponse;
 use thetahat::step_test::StepTest;
@@ -55,7 +56,7 @@ impl Validation {
 
     /// The table that `thetahat validate` prints.
     fn table(&self) -> String {
-        thetahat_cli::validation(&self.found.validation, &self.requirements, self.alpha, thetahat_cli::WIDTH)
+        tables::validation(&self.found.validation, &self.requirements, self.alpha, error::layout())
     }
 
     /// What was required and is not met, in words with the figures.
@@ -93,7 +94,7 @@ pub(crate) fn compare(
         thetahat::report::compare(&found)
     })?;
     let json = comparison.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::comparison(&comparison, thetahat_cli::WIDTH)))
+    Ok((json, tables::comparison(&comparison, error::layout())))
 }
 
 /// What a log is worth: the document that `thetahat inspect` writes, and its table.
@@ -164,7 +165,7 @@ pub(crate) fn spectrum(
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let found = interruptible(py, move |_| thetahat::spectrum::spectrum(&log, &sources, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::response(&found, thetahat_cli::WIDTH)))
+    Ok((json, tables::response(&found, error::layout())))
 }
 
 /// What the steps of a log show, with the options of `thetahat step`: the document that it writes, and its table.
@@ -198,10 +199,10 @@ pub(crate) fn sine_test(py: Python<'_>, response: &str, input: &str) -> PyResult
 
 fn step_document(py: Python<'_>, found: &StepTest) -> PyResult<(String, String)> {
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::step_test(found, thetahat_cli::WIDTH)))
+    Ok((json, tables::step_test(found, error::layout())))
 }
 
 fn written(py: Python<'_>, found: &Inspection) -> PyResult<(String, String)> {
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, thetahat_cli::inspection(found, thetahat_cli::WIDTH)))
+    Ok((json, tables::inspection(found, error::layout())))
 }

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use thetahat::Document;
 use thetahat::filter::{Estimator, InitialState, ObserverGain, StateEstimate, StateValues};
+use thetahat::present::tables;
 use thetahat::thetahat_core::nalgebra::Complex;
 
 use crate::array::{finite_matrix, matrix, vector};
@@ -398,7 +399,7 @@ impl StateFilter {
 
     /// The table that `thetahat filter` prints.
     fn table(&self) -> String {
-        thetahat_cli::filtered(&self.filter.summary(), "", thetahat_cli::WIDTH)
+        tables::filtered(&self.filter.summary(), "", error::layout())
     }
 
     /// What to think of normalised innovations that are far from what the model says.

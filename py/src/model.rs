@@ -10,6 +10,7 @@ use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::export::{Plan, export};
 use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
+use thetahat::present::tables;
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{Draws, Horizon, InitialCondition, TransientResponse, logarithmic_frequencies};
 use thetahat::spectrum::MeasuredResponse;
@@ -163,7 +164,7 @@ impl Model {
 
     /// The table that `thetahat fit` prints.
     fn table(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(thetahat_cli::table(&*self.report(py)?, thetahat_cli::WIDTH))
+        Ok(tables::report(&*self.report(py)?, error::layout()))
     }
 
     /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
@@ -197,7 +198,7 @@ impl Model {
                 }
                 validated.push(found);
             }
-            Ok(thetahat::report::fit_page(&report, &validated, &held_out, &command))
+            Ok(thetahat::present::fit_page(&report, &validated, &held_out, &command))
         })
     }
 

@@ -7,6 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use thetahat::Document;
+use thetahat::present::tables;
 use thetahat::track::PerChannel;
 use thetahat_cli::{Failure, TrackedRow, Tracking};
 
@@ -199,7 +200,7 @@ impl Tracker {
     /// The table that `thetahat track` prints.
     fn table(&self) -> String {
         let watched = self.tracking.trackers().iter().any(|tracker| tracker.detector().is_some());
-        thetahat_cli::tracking(&self.tracking.summary(), "", watched, thetahat_cli::WIDTH)
+        tables::tracking(&self.tracking.summary(), "", watched, error::layout())
     }
 
     /// The parameters of each tracker; NaN before there is an estimate.

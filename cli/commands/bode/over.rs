@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use thetahat::model::{LinearModel, Model};
-use thetahat::report::response_page;
+use thetahat::present::response_page;
 use thetahat::respond::{FrequencyPoint, FrequencyResponse};
 use thetahat::spectrum::MeasuredResponse;
 

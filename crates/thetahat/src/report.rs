@@ -14,8 +14,6 @@
 //! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] (a [`Demand`] of an output or of all) makes a gate of a validation.
 //! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
 //!   [`held_out_runs`] are the free runs of the models between which a choice was made.
-//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`, `step_test_page` and `transient_page`
-//!   (of a `Transient`) make pages with charts.
 //!
 //! ```
 //! use thetahat::Document;
@@ -43,8 +41,6 @@ mod experiments;
 mod fitted_rows;
 mod from_sums;
 mod held_out_runs;
-#[cfg(feature = "html")]
-mod html;
 mod identify;
 mod nonlinear_arx;
 mod nonlinear_choice;
@@ -71,11 +67,6 @@ pub use apply::{Applied, AppliedOutput, apply};
 pub use equations::{EquationsPlan, answer_equations, fit_equations, fit_equations_distributed};
 pub use experiments::Experiments;
 pub use held_out_runs::held_out_runs;
-#[cfg(feature = "html")]
-pub use html::{
-    Transient, comparison_page, fit_page, inspection_page, response_page, step_test_page, transient_page,
-    tuning_page, validation_page,
-};
 pub use identify::{identify, identify_monitored};
 pub use nonlinear_arx::{Centres, InputLags, MapPlan, NonlinearArxPlan};
 pub use nonlinear_choice::{fit_nonlinear_arx, fit_nonlinear_arx_monitored};

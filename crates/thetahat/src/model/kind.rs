@@ -332,7 +332,7 @@ impl Model {
     }
 
     /// What it is called, with the equation where that is short.
-    pub(crate) fn headline(&self) -> String {
+    pub fn headline(&self) -> String {
         match self {
             Self::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
             Self::Equations(_)

@@ -1,14 +1,15 @@
 //! A controller as a table for people.
 
-use thetahat::control::Control;
-use thetahat::figures::{fixed, number};
-use thetahat::text::harmless;
+use crate::control::Control;
+use crate::figures::{fixed, number};
+use crate::present::Layout;
+use crate::text::harmless;
 
 use super::text::{Text, columns, or_dash};
 
-/// The coefficients and what the loop does, this many columns wide.
-pub fn control(found: &Control, width: usize) -> String {
-    let mut text = Text::new(width);
+/// The coefficients and what the loop does.
+pub fn control(found: &Control, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let (input, output) = (harmless(&found.input.name), harmless(&found.output.name));
     text.line(&format!("{} from {input} to {output}: {}", found.model, found.design));
     text.line("R(q) u = T(q) u_c - S(q) y, every sample, in deviations from the working point");

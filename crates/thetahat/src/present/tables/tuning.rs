@@ -1,14 +1,15 @@
 //! Settings of controllers as a table for people.
 
-use thetahat::figures::{fixed, number, seconds, short};
-use thetahat::text::harmless;
-use thetahat::tune::{ReducedProcess, Tuning};
+use crate::figures::{fixed, number, seconds, short};
+use crate::present::Layout;
+use crate::text::harmless;
+use crate::tune::{ReducedProcess, Tuning};
 
 use super::text::{Text, columns, or_dash};
 
-/// The settings by each rule, and what the loops with them do, this many columns wide.
-pub fn tuning(found: &Tuning, width: usize) -> String {
-    let mut text = Text::new(width);
+/// The settings by each rule, and what the loops with them do.
+pub fn tuning(found: &Tuning, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     text.line(&format!("{} from {} to {}", found.model, harmless(&found.input), harmless(&found.output)));
     text.line("C(s) = Kc (1 + 1/(Ti s) + Td s/(1 + Td s/10)), the derivative of the output");
     text.line("");

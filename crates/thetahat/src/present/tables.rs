@@ -1,4 +1,4 @@
-//! A report as a table for people.
+//! Documents as tables of text.
 
 mod continuous;
 mod control;
@@ -19,27 +19,30 @@ mod tracking;
 mod tuning;
 mod validation;
 
-use thetahat::data::Rows;
-use thetahat::estimate::{
+use crate::data::Rows;
+use crate::estimate::{
     ConvexOutcome, Criteria, InformationCriterion, Initial, Norm, Procedure, RobustOutcome, SearchOutcome,
     Solver,
 };
-use thetahat::figures::{error, fixed, number, of_unit, scientific, seconds, short};
-use thetahat::model::{Interval, Model, Orders, PolynomialModel, Quantity, Root, Signal, Structure};
-use thetahat::optimize::{Algorithm, Stopped};
-use thetahat::report::{Estimation, Report};
-use thetahat::respond::InitialCondition;
-use thetahat::text::harmless;
-use thetahat::validate::{Fit, Part};
+use crate::figures::{error, fixed, number, of_unit, scientific, seconds, short};
+use crate::model::{Interval, Model, Orders, PolynomialModel, Quantity, Root, Signal, Structure};
+use crate::optimize::Algorithm;
+use crate::present::Layout;
+use crate::present::words::{complex, part, stopped};
+use crate::report::{Estimation, Report};
+use crate::respond::InitialCondition;
+use crate::text::harmless;
+use crate::validate::Fit;
 
 pub use control::control;
 pub use design::experiment_design;
-pub(crate) use design::test_signal;
+pub use design::test_signal;
 pub use filtered::filtered;
 pub use inspection::inspection;
-pub(crate) use reduction::hankel_singular_values;
+pub use reduction::hankel_singular_values;
 pub use response::response;
 pub use step_test::step_test;
+pub use text::wrapped;
 use text::{Text, columns, or_dash, some};
 pub use topics::topics;
 pub use tracking::tracking;
@@ -56,26 +59,26 @@ const NO_ROOT_ERROR: &str =
     "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
 const NO_FIT: &str = "the output is constant, no sample counts, or the response overflows";
 
-/// The model of a report that was converted, which has no figures of a fit, this many columns wide.
-pub(crate) fn converted(report: &Report, width: usize) -> String {
+/// The model of a report that was converted, which has no figures of a fit.
+pub fn converted(report: &Report, layout: Layout) -> String {
     match &report.model {
-        Model::StateSpace(model) => state_space::model_alone(report, model, width),
-        _ => table(report, width),
+        Model::StateSpace(model) => state_space::model_alone(report, model, layout),
+        _ => self::report(report, layout),
     }
 }
 
-/// The report's main figures, this many columns wide.
-pub fn table(report: &Report, width: usize) -> String {
+/// The report's main figures.
+pub fn report(report: &Report, layout: Layout) -> String {
     let mut shown = match &report.model {
-        Model::Polynomial(model) => polynomial(report, model, width),
-        Model::Equations(model) => equations::table(report, model, width),
-        Model::NonlinearArx(model) => nonlinear_arx::table(report, model, width),
-        Model::Process(model) => process::table(report, model, width),
-        Model::StateSpace(model) => state_space::table(report, model, width),
-        Model::ContinuousStateSpace(model) => continuous::table(report, model, width),
+        Model::Polynomial(model) => polynomial(report, model, layout),
+        Model::Equations(model) => equations::table(report, model, layout),
+        Model::NonlinearArx(model) => nonlinear_arx::table(report, model, layout),
+        Model::Process(model) => process::table(report, model, layout),
+        Model::StateSpace(model) => state_space::table(report, model, layout),
+        Model::ContinuousStateSpace(model) => continuous::table(report, model, layout),
     };
     if !report.purpose.is_empty() {
-        let mut text = Text::new(width);
+        let mut text = Text::new(layout);
         text.line("");
         text.line(&report.purpose);
         shown.push_str(&text.finish());
@@ -83,8 +86,8 @@ pub fn table(report: &Report, width: usize) -> String {
     shown
 }
 
-fn polynomial(report: &Report, model: &PolynomialModel, width: usize) -> String {
-    let mut text = Text::new(width);
+fn polynomial(report: &Report, model: &PolynomialModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     selection::selection(&mut text, report);
     text.line(&format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
@@ -283,15 +286,6 @@ fn counted(iterations: usize) -> String {
     format!("{iterations} iteration{}", if iterations == 1 { "" } else { "s" })
 }
 
-fn stopped(stopped: Stopped) -> &'static str {
-    match stopped {
-        Stopped::Converged => "converged",
-        Stopped::NoDescent => "stopped where no step lowers the cost",
-        Stopped::MaxIterations => "stopped at the most iterations",
-        Stopped::TimeLimit => "stopped by the time limit",
-    }
-}
-
 /// What was made small where wild samples do not rule.
 fn robust(text: &mut Text, found: &RobustOutcome, start: Initial) {
     let loss = found.k.map_or_else(
@@ -352,11 +346,8 @@ fn dynamics(text: &mut Text, model: &PolynomialModel) {
     let mut count = 0;
     let mut add = |role: &str, root: &Root, time: Option<Option<Quantity>>| {
         // What one letter says elsewhere.
-        let row = [
-            format!("{role} of {}", root.polynomial.to_uppercase()),
-            text::complex(root),
-            text::spread(root),
-        ];
+        let row =
+            [format!("{role} of {}", root.polynomial.to_uppercase()), complex(root), text::spread(root)];
         let value = time.map(|time| or_dash(time, |time| of_unit(time.value, "s")));
         let interval = time.map(|time| or_dash(time.and_then(|time| time.interval), interval));
         roots.row(row.into_iter().chain([value, interval].map(Option::unwrap_or_default)));
@@ -404,12 +395,7 @@ fn fits(text: &mut Text, fits: &[Fit]) {
     let words: &[usize] = if several { &[1, 2, 3, 4] } else { &[1, 2, 3] };
     let mut table = columns(head).words(words).none(NO_FIT);
     for fit in fits {
-        let part = match fit.part {
-            Some(Part::Estimation) => "estimation",
-            Some(Part::Validation) => "validation",
-            Some(Part::Test) => "test",
-            None => "",
-        };
+        let part = fit.part.map_or("", part);
         let output = several.then(|| harmless(&fit.output));
         table.row(output.into_iter().chain([
             part.to_owned(),
@@ -425,7 +411,7 @@ fn fits(text: &mut Text, fits: &[Fit]) {
 }
 
 /// One line that says how close a response is.
-pub(crate) fn figure(fit: &Fit) -> String {
+pub fn figure(fit: &Fit) -> String {
     let percent = fit.percent.map_or_else(|| "none".to_owned(), |percent| format!("{} %", fixed(percent, 3)));
     let rmse = fit.rmse.map_or_else(|| "none".to_owned(), number);
     format!(

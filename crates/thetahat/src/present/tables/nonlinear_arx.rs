@@ -1,10 +1,11 @@
 //! What a fit of a nonlinear ARX model found, as a table for people.
 
-use thetahat::estimate::{Procedure, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
-use thetahat::figures::{error, number, scientific, seconds, short};
-use thetahat::model::{NonlinearArxModel, Parameter};
-use thetahat::report::Report;
-use thetahat::text::harmless;
+use crate::estimate::{Procedure, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
+use crate::figures::{error, number, scientific, seconds, short};
+use crate::model::{NonlinearArxModel, Parameter};
+use crate::present::Layout;
+use crate::report::Report;
+use crate::text::harmless;
 
 use super::text::{Table, Text, columns, or_dash};
 use super::{NO_ERROR, counted, criteria, fits, signal, stopped, word};
@@ -13,8 +14,8 @@ use super::{NO_ERROR, counted, criteria, fits, signal, stopped, word};
 const NO_RUN: &str = "functions that are always there are still to come, or the run grows without bound";
 
 /// The main figures of a fit of a nonlinear ARX model.
-pub(super) fn table(report: &Report, model: &NonlinearArxModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn table(report: &Report, model: &NonlinearArxModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     text.line(&format!("{}, sample time {}", harmless(&report.model.name()), seconds(model.sample_time)));
     let signals = model.inputs.iter().map(|input| signal("input", input));
     let outputs = model.outputs.iter().map(|output| signal("output", output));

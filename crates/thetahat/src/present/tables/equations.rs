@@ -1,19 +1,20 @@
 //! What a fit of a model in equations found, as a table for people.
 
-use thetahat::figures::{error, number, scientific, seconds, short};
-use thetahat::model::EquationsModel;
-use thetahat::report::Report;
-use thetahat::text::harmless;
+use crate::figures::{error, number, scientific, seconds, short};
+use crate::model::EquationsModel;
+use crate::present::Layout;
+use crate::report::Report;
+use crate::text::harmless;
 
 use super::filtered::surprise;
 use super::text::{Text, columns, or_dash};
 use super::{counted, criteria, fits, stopped, word};
 
 /// The main figures of a fit of a model in equations.
-pub(super) fn table(report: &Report, model: &EquationsModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn table(report: &Report, model: &EquationsModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let listed = |names: Vec<String>| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let names = |signals: &[thetahat::model::Signal]| {
+    let names = |signals: &[crate::model::Signal]| {
         listed(signals.iter().map(|signal| harmless(&signal.name)).collect())
     };
     text.line(&format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));

@@ -2,7 +2,7 @@
 
 use crate::data::Rows;
 use crate::figures::{number, spoken_time, three};
-use crate::model::{Interval, Quantity, Root};
+use crate::model::{Interval, Quantity};
 use crate::text::harmless;
 
 /// What stands where there is no figure.
@@ -37,14 +37,6 @@ pub(super) fn quantity(quantity: Quantity) -> String {
 pub(super) fn time_constant(time: Quantity) -> String {
     let spoken = spoken_time(time.value).map_or_else(String::new, |spoken| format!(" ({spoken})"));
     format!("{}{spoken}", quantity(time))
-}
-
-pub(super) fn complex(root: &Root) -> String {
-    if root.im == 0.0 {
-        return number(root.re);
-    }
-    let sign = if root.im < 0.0 { '-' } else { '+' };
-    format!("{} {sign} {}i", number(root.re), number(root.im.abs()))
 }
 
 pub(super) fn rows(rows: &[Rows]) -> String {

@@ -1,8 +1,8 @@
 //! How a model was chosen, for people.
 
-use thetahat::figures::{fixed, number};
-use thetahat::report::Report;
-use thetahat::select::{Candidate, Select, Selection};
+use crate::figures::{fixed, number};
+use crate::report::Report;
+use crate::select::{Candidate, Select, Selection};
 
 use super::orders_legend;
 use super::text::{Text, columns, or_dash};

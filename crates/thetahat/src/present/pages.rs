@@ -24,7 +24,6 @@ pub use response::response_page;
 pub use step_test::{step_test_page, transient_page};
 pub use tuning::tuning_page;
 
-use super::{Report, Validated, Validation};
 use crate::Error;
 use crate::data::{Finding, FindingKind, Rows, Source};
 use crate::figures::{self, fixed};
@@ -33,6 +32,8 @@ use crate::model::{
     ContinuousStateSpaceModel, EquationsModel, LinearModel, Map, Model, NonlinearArxModel, ProcessModel,
     StateSpaceModel,
 };
+use crate::present::words;
+use crate::report::{InSample, Report, Validated, Validation, compare};
 use crate::validate::{Fit, Part, Residuals};
 
 /// The channels of a log of very many that are on its page.
@@ -120,9 +121,9 @@ pub fn validation_page(report: &Report, validated: &Validated, command: &str) ->
     let mut page = Page::new(title, command, &validation.generator);
     page.lead = lead(model, &validation.fit);
     page.lead.push(match validation.in_sample {
-        super::InSample::No => "The model was not fitted to these rows.".to_owned(),
-        super::InSample::Partly => "The model was fitted to some of these rows.".to_owned(),
-        super::InSample::Yes => "The model was fitted to these rows: the figures flatter it.".to_owned(),
+        InSample::No => "The model was not fitted to these rows.".to_owned(),
+        InSample::Partly => "The model was fitted to some of these rows.".to_owned(),
+        InSample::Yes => "The model was fitted to these rows: the figures flatter it.".to_owned(),
     });
     page.warnings = &validation.warnings;
     let rows = match validation.rows.as_slice() {
@@ -176,7 +177,7 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
     page.warnings = &warnings;
 
     let mut section = Section::new("Side by side");
-    let criteria = super::compare(validated).ok().and_then(|comparison| comparison.criteria);
+    let criteria = compare(validated).ok().and_then(|comparison| comparison.criteria);
     section.table(tables::comparison(&named, criteria.as_deref()));
     section.text("Too many outside from alpha on: the smallest alpha at which a fraction alpha of the correlations of the residuals, \
                   or more, lies outside the band of that level. The larger, the better; it is no verdict.");
@@ -331,7 +332,7 @@ fn lead(model: &Model, fits: &[Fit]) -> Vec<String> {
         ),
     ];
     let figure = |fit: &Fit| {
-        let on = fit.part.map_or_else(String::new, |part| format!(", {} rows", tables::part(part)));
+        let on = fit.part.map_or_else(String::new, |part| format!(", {} rows", words::part(part)));
         let of = if several { format!("{}, ", fit.output) } else { String::new() };
         Some(format!("{} % ({of}{}{on})", fixed(fit.percent?, 1), fit.horizon))
     };
@@ -353,10 +354,7 @@ fn part_name(report: &Report, validation: &Validation) -> String {
         _ if validation.rows == data.validation => Some(Part::Validation),
         _ => None,
     });
-    part.map_or_else(
-        || format!("rows {}", text::rows(&validation.rows)),
-        |part| tables::part(part).to_owned(),
-    )
+    part.map_or_else(|| format!("rows {}", text::rows(&validation.rows)), |part| words::part(part).to_owned())
 }
 
 /// The parts of the log, where there are several; else the logs, where there are several.

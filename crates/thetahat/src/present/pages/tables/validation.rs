@@ -2,17 +2,17 @@
 
 use super::{in_sample, yes};
 use crate::figures::{chance, fixed, number, short, three};
+use crate::present::pages::page::Table;
+use crate::present::pages::text::{or_dash, percent};
 use crate::report::Validation;
-use crate::report::html::page::Table;
-use crate::report::html::text::{or_dash, percent};
 
 /// Who, and of which output where there are several.
-pub(in crate::report::html) fn which(who: &str, validation: &Validation, output: &str) -> String {
+pub(in crate::present::pages) fn which(who: &str, validation: &Validation, output: &str) -> String {
     if validation.noise.len() > 1 { format!("{who}, {output}") } else { who.to_owned() }
 }
 
 /// The tests of what is left of several parts, or by several models: `who` says which.
-pub(in crate::report::html) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
+pub(in crate::present::pages) fn tests(who: &str, parts: &[(String, &Validation)]) -> Table {
     let mut table = Table::new(
         "Tests of the residuals",
         &["test", who, "lags", "statistic", "degrees of freedom", "p-value"],
@@ -63,7 +63,7 @@ pub(super) fn asked(validation: &Validation) -> &'static str {
 }
 
 /// Anderson's test for each level.
-pub(in crate::report::html) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
+pub(in crate::present::pages) fn anderson(who: &str, parts: &[(String, &Validation)]) -> Table {
     let mut table = Table::new(
         "Correlations outside of their band (Anderson)",
         &["alpha", who, "band", "lags", "outside", "fraction", "p-value", "white"],
@@ -89,7 +89,7 @@ pub(in crate::report::html) fn anderson(who: &str, parts: &[(String, &Validation
 }
 
 /// How often the output lies in its prediction intervals.
-pub(in crate::report::html) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
+pub(in crate::present::pages) fn coverage(who: &str, parts: &[(String, &Validation)]) -> Table {
     let all = || parts.iter().flat_map(|(_, validation)| &validation.coverage);
     let mut levels: Vec<f64> = all().map(|one| one.level).collect();
     levels.sort_by(f64::total_cmp);
@@ -116,7 +116,7 @@ pub(in crate::report::html) fn coverage(who: &str, parts: &[(String, &Validation
 }
 
 /// The level of the errors beside that of the model.
-pub(in crate::report::html) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
+pub(in crate::present::pages) fn noise(who: &str, parts: &[(String, &Validation)]) -> Table {
     let head = [who, "mean of e²", "noise variance of the model", "ratio", "in-sample"];
     let mut table = Table::new("Errors one step ahead", &head);
     for (name, validation) in parts {

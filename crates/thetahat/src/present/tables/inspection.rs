@@ -1,17 +1,18 @@
 //! An inspection as a table for people.
 
-use thetahat::figures::{chance, fixed, number, seconds, short};
-use thetahat::inspect::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
-use thetahat::text::{brief, harmless};
+use crate::figures::{chance, fixed, number, seconds, short};
+use crate::inspect::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
+use crate::present::Layout;
+use crate::text::{brief, harmless};
 
 use super::text::{Text, columns, or_dash};
 
 /// This many channels, and warnings, are shown of very many.
 const MOST: usize = 10;
 
-/// What was found, the warnings, and the line that would fit a model, this many columns wide.
-pub fn inspection(inspection: &Inspection, width: usize) -> String {
-    let mut text = Text::new(width);
+/// What was found, the warnings, and the line that would fit a model.
+pub fn inspection(inspection: &Inspection, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     text.line(&clock(inspection));
     text.line("");
     let brief = inspection.brief(MOST);

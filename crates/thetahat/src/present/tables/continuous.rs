@@ -1,10 +1,11 @@
 //! A model in continuous time, as a table for people.
 
-use thetahat::figures::{number, of_unit, seconds, short, three};
-use thetahat::model::{ContinuousStateSpaceModel, ZerosPolesGain};
-use thetahat::report::Report;
-use thetahat::text::harmless;
-use thetahat::thetahat_core::nalgebra::Complex;
+use crate::figures::{number, of_unit, seconds, short, three};
+use crate::model::{ContinuousStateSpaceModel, ZerosPolesGain};
+use crate::present::{Layout, words::complex};
+use crate::report::Report;
+use crate::text::harmless;
+use thetahat_core::nalgebra::Complex;
 
 use super::signal;
 use super::state_space::gains;
@@ -18,8 +19,8 @@ const NO_ERROR: &str = "no time constant goes with a pole that does not decay, a
                          that are too close for one";
 
 /// The main figures of a model in continuous time.
-pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn table(report: &Report, model: &ContinuousStateSpaceModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let (name, step) = (report.model.name(), seconds(model.sample_time));
     text.line(&format!("{name}, from a sample time of {step} with {}", model.hold));
     text.line("dx/dt = A x + B u + K e, y = C x + D u + e");
@@ -52,7 +53,7 @@ fn poles(text: &mut Text, model: &ContinuousStateSpaceModel) {
     for (pole, ((frequency, damping), time)) in
         model.poles.iter().zip(figures).filter(|(pole, _)| pole.im >= 0.0)
     {
-        let value = text::complex(pole);
+        let value = complex(pole);
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
         let spread = known.then(|| text::spread(pole));
         let figures = [

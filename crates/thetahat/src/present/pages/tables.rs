@@ -4,12 +4,11 @@ mod inspection;
 mod validation;
 
 pub(super) use inspection::{channels, clock, delays, excitation};
-use thetahat_numerics::optimize::Stopped;
 use validation::asked;
 pub(super) use validation::{anderson, coverage, noise, tests, which};
 
 use super::page::Table;
-use super::text::{complex, or_dash, quantity, rows, time_constant};
+use super::text::{or_dash, quantity, rows, time_constant};
 use crate::data::{Rows, Source};
 use crate::estimate::{
     Criteria, InformationCriterion, Procedure, RefinementOutcome, TermsOutcome, VectorArxOutcome,
@@ -19,10 +18,11 @@ use crate::model::{
     ContinuousStateSpaceModel, EquationsModel, NonlinearArxModel, Orders, Parameter, PolynomialModel,
     ProcessModel, Quantity, Root, Signal, StateSpaceModel,
 };
+use crate::present::words::{complex, part, stopped};
 use crate::report::{Estimation, InSample, Report, Validated};
 use crate::respond::InitialCondition;
 use crate::select::{Candidate, Selection};
-use crate::validate::{Fit, Part};
+use crate::validate::Fit;
 
 /// The models of a search that are listed.
 const BEST: usize = 20;
@@ -311,27 +311,21 @@ pub(super) fn estimation(estimation: &Estimation, noise_variance: Option<f64>) -
 }
 
 fn procedure(procedure: &Procedure) -> String {
-    let stopped = |stopped: &Stopped| match stopped {
-        Stopped::Converged => "converged",
-        Stopped::NoDescent => "stopped where no step lowers the cost",
-        Stopped::MaxIterations => "stopped at the most iterations",
-        Stopped::TimeLimit => "stopped by the time limit",
-    };
     match procedure {
         Procedure::LeastSquares { .. } => "least squares".to_owned(),
         Procedure::InstrumentalVariables { .. } => "instrumental variables".to_owned(),
         Procedure::RefinedInstrumentalVariables { iterations, stopped: why, .. } => {
-            format!("refined instrumental variables, iterations: {iterations}, {}", stopped(why))
+            format!("refined instrumental variables, iterations: {iterations}, {}", stopped(*why))
         }
         Procedure::PredictionError(search) => {
-            format!("prediction error, iterations: {}, {}", search.iterations, stopped(&search.stopped))
+            format!("prediction error, iterations: {}, {}", search.iterations, stopped(search.stopped))
         }
         Procedure::Robust(outcome) => {
             let loss = outcome
                 .k
                 .map_or_else(|| "absolute errors".to_owned(), |k| format!("Huber's loss, k = {}", short(k)));
             let search = &outcome.search;
-            format!("{loss}, iterations: {}, {}", search.iterations, stopped(&search.stopped))
+            format!("{loss}, iterations: {}, {}", search.iterations, stopped(search.stopped))
         }
         Procedure::ExactLikelihood(outcome) => {
             let search = &outcome.search;
@@ -339,7 +333,7 @@ fn procedure(procedure: &Procedure) -> String {
                 "exact likelihood, ln L = {}, iterations: {}, {}",
                 or_dash(outcome.log_likelihood, |value| fixed(value, 4)),
                 search.iterations,
-                stopped(&search.stopped)
+                stopped(search.stopped)
             )
         }
         Procedure::Constrained(outcome) => {
@@ -350,7 +344,7 @@ fn procedure(procedure: &Procedure) -> String {
                     let iterations = search.costs.len().saturating_sub(1);
                     format!(
                         "linear programs, norm {norm}, iterations: {iterations}, {}",
-                        stopped(&search.stopped)
+                        stopped(search.stopped)
                     )
                 },
             )
@@ -363,7 +357,7 @@ fn procedure(procedure: &Procedure) -> String {
         Procedure::InnovationsLikelihood(outcome) => format!(
             "largest likelihood of the innovations, iterations: {}, {}",
             outcome.search.iterations,
-            stopped(&outcome.search.stopped)
+            stopped(outcome.search.stopped)
         ),
         Procedure::ForwardRegression(outcome) => each(&outcome.maps, |map| {
             let (candidates, by) = (map.candidates, &map.selected_by);
@@ -376,12 +370,12 @@ fn procedure(procedure: &Procedure) -> String {
         Procedure::FrequencyResponse(outcome) => format!(
             "least errors of the frequency response, iterations: {}, {}",
             outcome.iterations,
-            stopped(&outcome.stopped)
+            stopped(outcome.stopped)
         ),
         Procedure::FreeRun(outcome) => format!(
             "least errors of the free run, iterations: {}, {}; errors of the colour of an autoregression of order {}",
             outcome.iterations,
-            stopped(&outcome.stopped),
+            stopped(outcome.stopped),
             outcome.noise_order
         ),
         Procedure::Subspace(outcome) => format!(
@@ -395,7 +389,7 @@ fn procedure(procedure: &Procedure) -> String {
                     "; refined for the least errors of {}, iterations: {}, {}",
                     errors.of(),
                     search.iterations,
-                    stopped(&search.stopped)
+                    stopped(search.stopped)
                 )
             )
         ),
@@ -417,7 +411,7 @@ fn procedure(procedure: &Procedure) -> String {
                 format!(
                     "; errors of the {} the least of {starts} starts, {}",
                     training.horizon,
-                    stopped(&training.stopped)
+                    stopped(training.stopped)
                 )
             });
             format!("trained: {tried} tried, the one taken by {by}{how}")
@@ -628,15 +622,6 @@ pub(super) fn comparison(models: &[(String, &Validated)], criteria: Option<&[Cri
         table.row(cells);
     }
     table.turned()
-}
-
-/// The part's name.
-pub(super) fn part(part: Part) -> &'static str {
-    match part {
-        Part::Estimation => "estimation",
-        Part::Validation => "validation",
-        Part::Test => "test",
-    }
 }
 
 fn start(start: InitialCondition) -> &'static str {

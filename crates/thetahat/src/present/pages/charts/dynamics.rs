@@ -12,6 +12,7 @@ use super::super::figure::{
 use super::super::object::{Object, marker, scatter, stroke};
 use super::super::text;
 use crate::model::{LinearModel, PolynomialModel, Quantity, Root, StateSpaceModel};
+use crate::present::words::complex;
 use crate::respond::{FrequencyResponse, TransientResponse, logarithmic_frequencies};
 use crate::{Error, figures};
 
@@ -280,7 +281,7 @@ fn z_plane(groups: &[Group<'_>], sample_time: f64) -> Drawn {
             let frequency = angle / sample_time;
             format!(
                 "{} of {}<br>modulus {}<br>angle {} rad, {} rad/s",
-                text::complex(root),
+                complex(root),
                 root.polynomial.to_uppercase(),
                 figures::short(modulus),
                 figures::three(angle),
@@ -306,7 +307,7 @@ fn z_plane(groups: &[Group<'_>], sample_time: f64) -> Drawn {
         " Outlined: regions that hold the root in 95 of 100 cases, to first order; of real roots an interval. Roots too near to \
          one another for that have none."
     });
-    let away: Vec<String> = all().filter(|root| far(root)).map(|root| text::complex(root)).collect();
+    let away: Vec<String> = all().filter(|root| far(root)).map(|root| complex(root)).collect();
     if !away.is_empty() {
         words.push_str(&format!(" Outside of the picture: {}.", away.join(", ")));
     }

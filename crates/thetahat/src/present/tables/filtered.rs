@@ -1,15 +1,16 @@
 //! What `filter` says at its end.
 
-use thetahat::filter::{EstimatedNumber, FilterSummary};
-use thetahat::respond::NisSummary;
+use crate::filter::{EstimatedNumber, FilterSummary};
+use crate::present::Layout;
+use crate::respond::NisSummary;
 
-use thetahat::figures::{error, fixed, number};
+use crate::figures::{error, fixed, number};
 
 use super::text::{Text, columns, or_dash};
 
 /// How consistent the innovations were (NIS), and where the state has come to.
-pub fn filtered(summary: &FilterSummary, faults: &str, width: usize) -> String {
-    let mut text = Text::new(width);
+pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let estimator = match summary.estimator.as_str() {
         "kalman" => "Kalman filter",
         "ekf" => "extended Kalman filter",

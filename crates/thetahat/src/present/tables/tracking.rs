@@ -1,14 +1,15 @@
 //! What `track` says at its end.
 
-use thetahat::figures::{error, fixed, number, short};
-use thetahat::track::{TrackSummary, TrackerSummary};
+use crate::figures::{error, fixed, number, short};
+use crate::present::Layout;
+use crate::track::{TrackSummary, TrackerSummary};
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_ERROR, formula};
 
 /// How the ways to forget did, and where each has come to.
-pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, width: usize) -> String {
-    let mut text = Text::new(width);
+pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let gaps = match summary.gaps {
         0 => String::new(),
         1 => ", 1 gap".to_owned(),

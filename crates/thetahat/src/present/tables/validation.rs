@@ -1,12 +1,13 @@
 //! Validations and comparisons as tables for people.
 
-use thetahat::estimate::InformationCriterion;
-use thetahat::figures::{chance, fixed, number, short, three};
-use thetahat::model::Orders;
-use thetahat::report::{Comparison, Coverage, InSample, Requirement, Validation};
-use thetahat::respond::Horizon;
-use thetahat::text::harmless;
-use thetahat::validate::{Fit, Independence, Residuals, Test};
+use crate::estimate::InformationCriterion;
+use crate::figures::{chance, fixed, number, short, three};
+use crate::model::Orders;
+use crate::present::Layout;
+use crate::report::{Comparison, Coverage, InSample, Requirement, Validation};
+use crate::respond::Horizon;
+use crate::text::harmless;
+use crate::validate::{Fit, Independence, Residuals, Test};
 
 use super::text::{Text, columns, or_dash, some};
 use super::{MOST, NO_FIT, fits, orders_legend, rows};
@@ -19,9 +20,9 @@ type ErrorFigure = (&'static str, fn(&Fit) -> Option<f64>);
 const ERRORS: [ErrorFigure; 2] =
     [("mean |e|", |fit| fit.mean_absolute_error), ("largest |e|", |fit| fit.largest_error)];
 
-/// How a model does on a log, and what was required of it, this many columns wide.
-pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, width: usize) -> String {
-    let mut text = Text::new(width);
+/// How a model does on a log, and what was required of it.
+pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     text.line(&format!(
         "{}, {}, on {} rows {}: {}",
@@ -64,9 +65,9 @@ pub fn validation(found: &Validation, requirements: &[Requirement], alpha: f64, 
 }
 
 /// Several models, a column for each, this many columns of text wide.
-pub fn comparison(comparison: &Comparison, width: usize) -> String {
+pub fn comparison(comparison: &Comparison, layout: Layout) -> String {
     let models = &comparison.models;
-    let mut text = Text::new(width);
+    let mut text = Text::new(layout);
     if let Some(first) = models.first() {
         let files: Vec<String> = first.logs.iter().map(|log| harmless(&log.file)).collect();
         text.line(&format!("{} rows {}", some(&files, MOST, ", "), rows(&first.rows)));

@@ -1,7 +1,8 @@
 //! Test signals, and what they are worth, for people.
 
-use thetahat::design::{ExperimentDesign, SignalFigures, SignalPlan, SignalWorth, TestSignal};
-use thetahat::figures::{error, fixed, number, seconds, short, three};
+use crate::design::{ExperimentDesign, SignalFigures, SignalPlan, SignalWorth, TestSignal};
+use crate::figures::{error, fixed, number, seconds, short, three};
+use crate::present::Layout;
 
 use super::ROUNDING;
 use super::text::{Text, columns, or_dash};
@@ -10,7 +11,7 @@ use super::text::{Text, columns, or_dash};
 const TOO_LONG: &str = "not with a million samples, or not with this signal";
 
 /// What a signal is, in lines: the whole, then each channel.
-pub(crate) fn test_signal(
+pub fn test_signal(
     plan: &SignalPlan,
     signal: &TestSignal,
     names: &[String],
@@ -47,9 +48,9 @@ pub(crate) fn test_signal(
     std::iter::once(about.join(", ")).chain(names.iter().zip(figures).map(channel)).collect()
 }
 
-/// The errors that signals would give, side by side, this many columns wide.
-pub fn experiment_design(found: &ExperimentDesign, width: usize) -> String {
-    let mut text = Text::new(width);
+/// The errors that signals would give, side by side.
+pub fn experiment_design(found: &ExperimentDesign, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     text.line(&format!(
         "{}, sample time {}: standard errors after {} samples",
         found.model,

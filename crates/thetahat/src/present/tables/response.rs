@@ -1,9 +1,10 @@
 //! A measured response as a table for people.
 
-use thetahat::data::Rows;
-use thetahat::figures::{error, fixed, number, seconds, three};
-use thetahat::spectrum::MeasuredResponse;
-use thetahat::text::{brief, harmless};
+use crate::data::Rows;
+use crate::figures::{error, fixed, number, seconds, three};
+use crate::present::Layout;
+use crate::spectrum::MeasuredResponse;
+use crate::text::{brief, harmless};
 
 use super::text::{Text, columns, or_dash, some};
 
@@ -11,9 +12,9 @@ use super::text::{Text, columns, or_dash, some};
 const MOST: usize = 20;
 const SEGMENTS: usize = 4;
 
-/// How it was found, some of its points, and the warnings, this many columns wide.
-pub fn response(found: &MeasuredResponse, width: usize) -> String {
-    let mut text = Text::new(width);
+/// How it was found, some of its points, and the warnings.
+pub fn response(found: &MeasuredResponse, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     let rows: usize = found.rows.iter().map(Rows::len).sum();
     text.line(&format!(
@@ -57,7 +58,7 @@ pub fn response(found: &MeasuredResponse, width: usize) -> String {
             ]);
         }
         if shown < count {
-            table.legend(format!("{shown} of {count} frequencies; CSV and JSON have all of them (--format)"));
+            table.legend(format!("{shown} of {count} frequencies; CSV and JSON have all of them (`format`)"));
         }
         text.line(&format!("from {} to {}", brief(input, 40), brief(&found.output, 40)));
         text.table(table);

@@ -1,14 +1,15 @@
 //! The topics of a log as a table for people.
 
-use thetahat::figures::short;
-use thetahat::inspect::{TopicList, TopicSummary};
-use thetahat::text::harmless;
+use crate::figures::short;
+use crate::inspect::{TopicList, TopicSummary};
+use crate::present::Layout;
+use crate::text::harmless;
 
 use super::text::{Text, columns};
 
-/// The topics with their rates, their fields, the warnings, and what to type next, this many columns wide.
-pub fn topics(list: &TopicList, width: usize) -> String {
-    let mut text = Text::new(width);
+/// The topics with their rates, their fields, the warnings, and what to type next.
+pub fn topics(list: &TopicList, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let file = harmless(&list.file);
     text.line(&format!("{file}: {} topics, each with a clock of its own", list.topics.len()));
     text.line("");

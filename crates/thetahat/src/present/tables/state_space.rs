@@ -1,10 +1,11 @@
 //! What a fit of a state-space model found, as a table for people.
 
-use thetahat::estimate::{Coupling, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
-use thetahat::figures::{fixed, number, of_unit, seconds, three};
-use thetahat::model::{Quantity, Signal, StateSpaceModel};
-use thetahat::report::Report;
-use thetahat::text::harmless;
+use crate::estimate::{Coupling, RefinementOutcome, SubspaceOutcome, VectorArxOutcome};
+use crate::figures::{fixed, number, of_unit, seconds, three};
+use crate::model::{Quantity, Signal, StateSpaceModel};
+use crate::present::{Layout, words::complex};
+use crate::report::Report;
+use crate::text::harmless;
 
 use super::selection::selection;
 use super::text::{self, Text, columns, or_dash};
@@ -23,8 +24,8 @@ const NO_NOISE: &str = "nothing is left of an output";
 const EQUATION: &str = "x(t+1) = F x + G u + K e, y = H x + D u + e";
 
 /// The main figures of a fit in state space.
-pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn table(report: &Report, model: &StateSpaceModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     if report.selection.is_some() {
         selection(&mut text, report);
     }
@@ -62,8 +63,8 @@ pub(super) fn table(report: &Report, model: &StateSpaceModel, width: usize) -> S
 }
 
 /// The same without what a fit says.
-pub(super) fn model_alone(report: &Report, model: &StateSpaceModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn model_alone(report: &Report, model: &StateSpaceModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     head(&mut text, report, model, EQUATION);
     text.line("");
     figures(&mut text, model);
@@ -170,7 +171,7 @@ fn poles(text: &mut Text, model: &StateSpaceModel) {
         if known { columns(&all).words(&[4]).none(NO_ERROR) } else { columns(&few).none(NO_TIME) };
     // One of a pair stands for both.
     for (pole, time) in model.poles.iter().zip(&model.time_constants).filter(|(pole, _)| pole.im >= 0.0) {
-        let value = text::complex(pole);
+        let value = complex(pole);
         let value = if pole.im > 0.0 { format!("{value} and conjugate") } else { value };
         let spread = known.then(|| text::spread(pole));
         let interval = known.then(|| or_dash(time.and_then(|time| time.interval), interval));

@@ -1,18 +1,19 @@
 //! A step test as a table for people.
 
-use thetahat::figures::{error, fixed, number, of_unit, short};
-use thetahat::model::Quantity;
-use thetahat::step_test::{FittedProcess, Step, StepTest};
-use thetahat::text::{brief, harmless};
+use crate::figures::{error, fixed, number, of_unit, short};
+use crate::model::Quantity;
+use crate::present::Layout;
+use crate::step_test::{FittedProcess, Step, StepTest};
+use crate::text::{brief, harmless};
 
 use super::text::{Text, columns, or_dash};
 
 /// This many steps are shown of very many.
 const MOST: usize = 20;
 
-/// The steps, what is read off their responses by each way, and which to trust, this many columns wide.
-pub fn step_test(found: &StepTest, width: usize) -> String {
-    let mut text = Text::new(width);
+/// The steps, what is read off their responses by each way, and which to trust.
+pub fn step_test(found: &StepTest, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     let (input, output) = (brief(&found.input, 40), brief(&found.output, 40));
     let source = match found.steps.len() {
@@ -60,7 +61,7 @@ fn steps(text: &mut Text, steps: &[Step]) {
     }
     if steps.len() > MOST {
         table
-            .legend(format!("{MOST} of {} steps; the JSON document has all of them (--format)", steps.len()));
+            .legend(format!("{MOST} of {} steps; the JSON document has all of them (`format`)", steps.len()));
     }
     text.table(table);
 }

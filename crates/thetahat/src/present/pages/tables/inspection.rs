@@ -3,13 +3,13 @@
 use super::yes;
 use crate::figures::{chance, number, seconds, short, three};
 use crate::inspect::Inspection;
-use crate::report::html::page::Table;
-use crate::report::html::text::{or_dash, percent};
+use crate::present::pages::page::Table;
+use crate::present::pages::text::{or_dash, percent};
 
 /// Fewer channels than this stand beside each other, more below each other.
 const BESIDE: usize = 5;
 
-pub(in crate::report::html) fn clock(inspection: &Inspection) -> Table {
+pub(in crate::present::pages) fn clock(inspection: &Inspection) -> Table {
     let clock = &inspection.clock;
     let mut table = Table::new("Clock", &["figure", "value"]);
     let mut add = |name: &str, value: String| table.row([name.to_owned(), value]);
@@ -23,7 +23,7 @@ pub(in crate::report::html) fn clock(inspection: &Inspection) -> Table {
     table
 }
 
-pub(in crate::report::html) fn channels(inspection: &Inspection) -> Table {
+pub(in crate::present::pages) fn channels(inspection: &Inspection) -> Table {
     let head = [
         "channel",
         "role",
@@ -73,7 +73,7 @@ pub(in crate::report::html) fn channels(inspection: &Inspection) -> Table {
     if inspection.channels.len() < BESIDE { table.turned() } else { table }
 }
 
-pub(in crate::report::html) fn excitation(inspection: &Inspection) -> Table {
+pub(in crate::present::pages) fn excitation(inspection: &Inspection) -> Table {
     let alike = inspection.excitation.iter().any(|input| input.same_as.is_some());
     let head = ["input", "persistently exciting of order", "changes at", "the same but for scale and offset"];
     let mut table = Table::new("Excitation", if alike { &head } else { &head[..3] });
@@ -93,7 +93,7 @@ pub(in crate::report::html) fn excitation(inspection: &Inspection) -> Table {
 }
 
 /// Delays and feedback.
-pub(in crate::report::html) fn delays(inspection: &Inspection) -> Table {
+pub(in crate::present::pages) fn delays(inspection: &Inspection) -> Table {
     let mut table =
         Table::new("Delay and feedback", &["input", "delay [samples]", "confidence", "feedback", "p-value"]);
     for delay in &inspection.delays {

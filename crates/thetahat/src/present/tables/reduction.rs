@@ -1,6 +1,7 @@
 //! What each state of a model is worth, as a table for people.
 
-use thetahat::figures::number;
+use crate::figures::number;
+use crate::present::Layout;
 
 use super::text::{Text, columns, or_dash};
 
@@ -8,8 +9,8 @@ use super::text::{Text, columns, or_dash};
 const KEPT: &str = "its pole does not decay, and it is always kept";
 
 /// The Hankel singular values of a model, and the bounds of the errors where only so many states are kept.
-pub(crate) fn hankel_singular_values(values: &[f64], width: usize) -> String {
-    let mut text = Text::new(width);
+pub fn hankel_singular_values(values: &[f64], layout: Layout) -> String {
+    let mut text = Text::new(layout);
     let mut table = columns(&["states", "Hankel singular value", "error at most"]).none(KEPT);
     for (place, value) in values.iter().enumerate() {
         let known = Some(*value).filter(|value| value.is_finite());

@@ -1,15 +1,13 @@
 //! How sentences and tables are written: no line is wider than asked for, but for one long word.
 
-use std::fmt::Write;
-
+use crate::figures::error;
+use crate::model::Root;
+use crate::text::harmless;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 use textwrap::core::display_width;
-use thetahat::figures::{error, number};
-use thetahat::model::Root;
-use thetahat::text::harmless;
+use textwrap::{Options, WordSplitter};
 
-use crate::options::with_options;
-use crate::wrap::wrapped;
+use crate::present::Layout;
 
 /// What stands where there is no figure.
 const NONE: &str = "-";
@@ -20,18 +18,17 @@ const BETWEEN: usize = 2;
 #[derive(Debug)]
 pub(super) struct Text {
     lines: String,
-    /// No line is wider.
-    width: usize,
+    layout: Layout,
 }
 
 impl Text {
-    pub(super) fn new(width: usize) -> Self {
-        Self { lines: String::new(), width }
+    pub(super) fn new(layout: Layout) -> Self {
+        Self { lines: String::new(), layout }
     }
 
     /// Appends sentences.
     pub(super) fn line(&mut self, content: &str) {
-        self.verbatim(&wrapped(&with_options(content), self.width));
+        self.verbatim(&wrapped(&(self.layout.spelled)(content), self.layout.width));
     }
 
     /// Appends a line as it is, such as one to be typed.
@@ -45,11 +42,11 @@ impl Text {
 
     /// Appends a table, what its signs mean, and an empty line. What is too wide goes on below, the first column again in front.
     pub(super) fn table(&mut self, table: Table) {
-        for (position, columns) in table.blocks(self.width).into_iter().enumerate() {
+        for (position, columns) in table.blocks(self.layout.width).into_iter().enumerate() {
             if position > 0 {
                 self.verbatim("");
             }
-            for shown in table.drawn(&columns, self.width).lines() {
+            for shown in table.drawn(&columns, self.layout.width).lines() {
                 self.verbatim(shown.trim_end());
             }
         }
@@ -68,6 +65,16 @@ impl Text {
         self.lines.push('\n');
         self.lines
     }
+}
+
+/// Breaks lines between words. A word that is too long, such as the name of a file, stays whole.
+pub fn wrapped(text: &str, width: usize) -> String {
+    let options = Options::new(width)
+        .subsequent_indent("  ")
+        .break_words(false)
+        // Options begin with hyphens.
+        .word_splitter(WordSplitter::NoHyphenation);
+    textwrap::fill(text, options)
 }
 
 /// A table with a heading for each column.
@@ -178,16 +185,6 @@ pub(super) fn some<T: ToString>(all: &[T], most: usize, separator: &str) -> Stri
     format!("{}{more}", shown.join(separator))
 }
 
-pub(super) fn complex(root: &Root) -> String {
-    let mut text = number(root.re);
-    if root.im != 0.0 {
-        let sign = if root.im < 0.0 { '-' } else { '+' };
-        // Writing to a string cannot fail.
-        let _ = write!(text, " {sign} {}i", number(root.im.abs()));
-    }
-    text
-}
-
 /// The standard error of a real root; those of the real and the imaginary part of another.
 pub(super) fn spread(root: &Root) -> String {
     or_dash(root.covariance, |[[re, _], [_, im]]| {
@@ -210,7 +207,7 @@ mod tests {
     }
 
     fn written(width: usize) -> String {
-        let mut text = Text::new(width);
+        let mut text = Text::new(Layout { width, ..Layout::default() });
         text.table(table());
         text.finish()
     }
@@ -243,7 +240,7 @@ mod tests {
 
     #[test]
     fn sentences_are_wrapped_and_what_is_typed_is_not() {
-        let mut text = Text::new(20);
+        let mut text = Text::new(Layout { width: 20, ..Layout::default() });
         text.line("warning: the clock is irregular");
         text.verbatim("thetahat fit log.csv --time t");
         assert_eq!(text.finish(), "warning: the clock\n  is irregular\nthetahat fit log.csv --time t\n");

@@ -1,17 +1,18 @@
 //! What a fit of a process found, as a table for people.
 
-use thetahat::figures::{error, number, seconds, unit_of};
-use thetahat::model::ProcessModel;
-use thetahat::report::Report;
-use thetahat::text::harmless;
+use crate::figures::{error, number, seconds, unit_of};
+use crate::model::ProcessModel;
+use crate::present::Layout;
+use crate::report::Report;
+use crate::text::harmless;
 
 use super::selection::selection;
 use super::text::{Text, columns, or_dash};
 use super::{NO_ERROR, counted, fits, samples, signal, stopped};
 
 /// The main figures of a fit of a process.
-pub(super) fn table(report: &Report, model: &ProcessModel, width: usize) -> String {
-    let mut text = Text::new(width);
+pub(super) fn table(report: &Report, model: &ProcessModel, layout: Layout) -> String {
+    let mut text = Text::new(layout);
     selection(&mut text, report);
     text.line(&format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
     let formulas: Vec<String> = model.structures.iter().map(|structure| structure.equation()).collect();

@@ -76,10 +76,10 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Fit a model to one or several logs
     ///
-    /// Fits A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t): by least squares where that is linear in the parameters, else by
-    /// a search for the least sum of squared prediction errors. Without orders, delay, structure and orders are chosen from the
-    /// data; orders may also be ranges. Prints a table and writes a JSON report. Several logs are several experiments with one
-    /// plant: their rows are counted through, and nothing reaches from one into the next.
+    /// Fits A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t): by least squares where that is linear in the parameters,
+    /// else by a search for the least sum of squared prediction errors. Without orders, delay, structure and orders are
+    /// chosen from the data; orders may also be ranges. Prints a table and writes a JSON report. Several logs are
+    /// several experiments with one plant: their rows are counted through, and nothing reaches from one into the next.
     #[command(after_help = "\
 Examples:
   thetahat fit log.csv --sample-time 0.08
@@ -95,10 +95,10 @@ Examples:
     Fit(Box<FitArguments>),
     /// Inspect a log before any fit
     ///
-    /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers; of the
-    /// clock its step and jitter; of each input how much it excites, its delay and whether it follows the output. Ends
-    /// with warnings and the line of thetahat fit that goes with the log. Without -u and -y it inspects all columns of
-    /// numbers.
+    /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers;
+    /// of the clock its step and jitter; of each input how much it excites, its delay and whether it follows the
+    /// output. Ends with warnings and the line of thetahat fit that goes with the log. Without -u and -y it inspects
+    /// all columns of numbers.
     #[command(after_help = "\
 Examples:
   thetahat inspect log.csv --sample-time 0.08
@@ -106,10 +106,10 @@ Examples:
     Inspect(Box<InspectArguments>),
     /// The frequency response that a log shows, without a model
     ///
-    /// From each input to the output, with coherence, the spectrum of the noise and 95 % bands: by local polynomials, by windowed
-    /// covariances (Blackman and Tukey), by averages over windows (Welch), as the plain ratio of the transforms, or for sines by
-    /// correlation over whole periods. Says where the bands are not honest, where an input has no power, and whether it follows the output.
-    /// Several logs are several experiments with one plant.
+    /// From each input to the output, with coherence, the spectrum of the noise and 95 % bands: by local polynomials,
+    /// by windowed covariances (Blackman and Tukey), by averages over windows (Welch), as the plain ratio of the
+    /// transforms, or for sines by correlation over whole periods. Says where the bands are not honest, where an input
+    /// has no power, and whether it follows the output. Several logs are several experiments with one plant.
     #[command(after_help = "\
 Examples:
   thetahat spectrum log.csv --sample-time 0.08
@@ -118,9 +118,10 @@ Examples:
     Spectrum(Box<SpectrumArguments>),
     /// Predict a log some steps ahead with a fitted model
     ///
-    /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, that of the parameters included, in the
-    /// log's own units. The fit figures go to standard error. Rows at the end that have inputs but no output are forecast, each as many steps ahead as
-    /// it lies after the last measured one; a series without inputs is forecast beyond the end of the log.
+    /// Writes CSV: time or row, measured, predicted and the standard deviation of its error, that of the parameters
+    /// included, in the log's own units. The fit figures go to standard error. Rows at the end that have inputs but no
+    /// output are forecast, each as many steps ahead as it lies after the last measured one; a series without inputs is
+    /// forecast beyond the end of the log.
     #[command(after_help = "\
 Examples:
   thetahat predict model.json log.csv --horizon 5 > predicted.csv
@@ -129,8 +130,8 @@ Examples:
     /// Simulate a fitted model on a log's inputs (free run)
     ///
     /// Writes CSV: time or row, measured, predicted, in the log's own units. The fit figures go to standard error.
-    /// Without the output column, the run starts from zero. With --draws there are three more columns: mean, quantile_0.025 and
-    /// quantile_0.975 of runs with noise and with parameters drawn from their covariance.
+    /// Without the output column, the run starts from zero. With --draws there are three more columns: mean,
+    /// quantile_0.025 and quantile_0.975 of runs with noise and with parameters drawn from their covariance.
     #[command(after_help = "\
 Examples:
   thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv
@@ -139,8 +140,9 @@ Examples:
     /// Say how a fitted model does on a log, and whether anything is left in its residuals
     ///
     /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
-    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a warning of feedback; the noise beside the model's own; how often its
-    /// prediction intervals hold. With --require it is a gate: exit code 6 if the model does not meet it.
+    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a warning of feedback;
+    /// the noise beside the model's own; how often its prediction intervals hold. With --require it is a gate: exit
+    /// code 6 if the model does not meet it.
     #[command(after_help = "\
 Examples:
   thetahat validate model.json log.csv --rows 501..1000
@@ -149,8 +151,9 @@ Examples:
     Validate(ValidateArguments),
     /// Put several fitted models side by side on a log
     ///
-    /// The figures of validate, a column for each model, and the alpha from which on a fraction alpha of the correlations, or
-    /// more, lies outside the band of that level (Anderson): it orders models by how white they are, and is no verdict.
+    /// The figures of validate, a column for each model, and the alpha from which on a fraction alpha of the
+    /// correlations, or more, lies outside the band of that level (Anderson): it orders models by how white they are,
+    /// and is no verdict.
     #[command(after_help = "\
 Example:
   thetahat compare model.json model.json log.csv --rows 501..1000")]
@@ -158,8 +161,8 @@ Example:
     /// Identify a plant while it runs: a line for each sample of a log or a live pipe
     ///
     /// Recursive least squares for A(q) y(t) = B(q) u(t - nk) + e(t), and its extension by C(q) e(t). Each line has the
-    /// one-step prediction made before the sample, what the sample told, and the parameters after it. Ends with a table on
-    /// standard error. Runs until the log or the pipe ends, or Ctrl-C or SIGTERM end it; memory does not grow.
+    /// one-step prediction made before the sample, what the sample told, and the parameters after it. Ends with a table
+    /// on standard error. Runs until the log or the pipe ends, or Ctrl-C or SIGTERM end it; memory does not grow.
     #[command(after_help = "\
 Examples:
   thetahat track log.csv --na 2 --nb 2 --nk 3 --format csv > parameters.csv
@@ -169,12 +172,12 @@ Examples:
     Track(Box<TrackArguments>),
     /// Estimate the state of a model along a log or a live pipe
     ///
-    /// MODEL is a report of fit, or a text file (TOML) with the matrices F, G, H, Q, R, or with the equations of a plant, of
-    /// which unknown parameters are estimated together with the state. Each line has the states as predicted from the rows
-    /// before and as corrected by this one, with standard deviations (_sd); what was measured and predicted of each output,
-    /// and the innovation; the normalised innovation squared (nis) and between which bounds it lies in 95 % of the rows; and
-    /// held, the inputs that are missing in this row. An observer has predicted states only. Ends with a table on standard
-    /// error.
+    /// MODEL is a report of fit, or a text file (TOML) with the matrices F, G, H, Q, R, or with the equations of a
+    /// plant, of which unknown parameters are estimated together with the state. Each line has the states as predicted
+    /// from the rows before and as corrected by this one, with standard deviations (_sd); what was measured and
+    /// predicted of each output, and the innovation; the normalised innovation squared (nis) and between which bounds
+    /// it lies in 95 % of the rows; and held, the inputs that are missing in this row. An observer has predicted states
+    /// only. Ends with a table on standard error.
     #[command(after_help = "\
 Examples:
   thetahat filter spring.toml log.csv --format csv > states.csv
@@ -203,9 +206,9 @@ since the first row) and, in [next], dt (seconds of this step). The process nois
     /// The frequency response of a fitted model
     ///
     /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
-    /// magnitude [units of the output per unit of the input] and its standard error, phase [degrees] and its standard error.
-    /// With --over the models stand beside a measured response: at each of its points its magnitude and phase, those of the model, and
-    /// whether the model lies outside of the 95 % region of their difference.
+    /// magnitude [units of the output per unit of the input] and its standard error, phase [degrees] and its standard
+    /// error. With --over the models stand beside a measured response: at each of its points its magnitude and phase,
+    /// those of the model, and whether the model lies outside of the 95 % region of their difference.
     #[command(after_help = "\
 Examples:
   thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv
@@ -213,11 +216,12 @@ Examples:
     Bode(BodeArguments),
     /// What a step test shows, or what a fitted model does after a step
     ///
-    /// Of a log it finds the steps of the input and reads off each response what a course does, each way with its standard error: gain,
-    /// dead time, time constant (tangent, 63.2 %, two points, t-bar plain and weighted), rise and settling time, and of an overshoot
-    /// damping, period and natural frequency. Says which to trust. Of the document of spectrum it takes the time constant from the
-    /// frequency at which the phase is -45 degrees. Of a report it writes CSV with a row for each input and time: input, time [s], value
-    /// [units of the output per unit of the input] and its standard error; the input is 1 from time 0 on, and all is at rest before.
+    /// Of a log it finds the steps of the input and reads off each response what a course does, each way with its
+    /// standard error: gain, dead time, time constant (tangent, 63.2 %, two points, t-bar plain and weighted), rise and
+    /// settling time, and of an overshoot damping, period and natural frequency. Says which to trust. Of the document
+    /// of spectrum it takes the time constant from the frequency at which the phase is -45 degrees. Of a report it
+    /// writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the
+    /// input] and its standard error; the input is 1 from time 0 on, and all is at rest before.
     #[command(after_help = "\
 Examples:
   thetahat step steps.csv --time t -u heater -y temperature
@@ -226,18 +230,18 @@ Examples:
     Step(Box<StepArguments>),
     /// The impulse response of a fitted model
     ///
-    /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the input] and its
-    /// standard error. The input is 1 in the sample at time 0 and 0 afterwards; all is at rest before. The values are the
-    /// coefficients g_i of B(q)/(A(q) F(q)) = g_0 + g_1 q^-1 + …
+    /// Writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the
+    /// input] and its standard error. The input is 1 in the sample at time 0 and 0 afterwards; all is at rest before.
+    /// The values are the coefficients g_i of B(q)/(A(q) F(q)) = g_0 + g_1 q^-1 + …
     #[command(after_help = "\
 Example:
   thetahat impulse model.json --samples 50 > impulse.csv")]
     Impulse(TransientArguments),
     /// Leave out the states of a fitted model that matter least
     ///
-    /// By balanced truncation. Without --order it prints the Hankel singular values, how much of its inputs each state passes on to the outputs,
-    /// and how far the frequency response may be off where only so many states are kept. With --order it writes the report of the
-    /// reduced model, which all verbs take.
+    /// By balanced truncation. Without --order it prints the Hankel singular values, how much of its inputs each state
+    /// passes on to the outputs, and how far the frequency response may be off where only so many states are kept. With
+    /// --order it writes the report of the reduced model, which all verbs take.
     #[command(after_help = "\
 Examples:
   thetahat reduce model.json
@@ -245,10 +249,11 @@ Examples:
     Reduce(ReduceArguments),
     /// A fitted model at another sample time, or in continuous time
     ///
-    /// With zoh and foh by the logarithm of the transition matrix, so that the samples of the model stay what they were; tustin maps any poles
-    /// but bends frequencies. Poles at or left of 0 have no counterpart in continuous time: they are named, and only whole multiples of the sample
-    /// time are left. Delays are taken off before, and with zoh they may be any fraction of a sample. Models of polynomials, in state space and
-    /// of processes become models in state space. One in continuous time goes with any log: the verbs sample it as the log is.
+    /// With zoh and foh by the logarithm of the transition matrix, so that the samples of the model stay what they
+    /// were; tustin maps any poles but bends frequencies. Poles at or left of 0 have no counterpart in continuous time:
+    /// they are named, and only whole multiples of the sample time are left. Delays are taken off before, and with zoh
+    /// they may be any fraction of a sample. Models of polynomials, in state space and of processes become models in
+    /// state space. One in continuous time goes with any log: the verbs sample it as the log is.
     #[command(after_help = "\
 Examples:
   thetahat convert model.json --to continuous
@@ -257,9 +262,9 @@ Examples:
     Convert(ConvertArguments),
     /// PI and PID settings for a fitted process, and the closed loop that they give
     ///
-    /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings stands what the loop
-    /// with the fitted process does: steps of the set point and of the load, Ms, gain and phase margin, and the worst Ms within the 95 %
-    /// intervals of the parameters.
+    /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings
+    /// stands what the loop with the fitted process does: steps of the set point and of the load, Ms, gain and phase
+    /// margin, and the worst Ms within the 95 % intervals of the parameters.
     #[command(after_help = "\
 Examples:
   thetahat tune heater.json
@@ -267,9 +272,10 @@ Examples:
     Tune(TuneArguments),
     /// A controller for a fitted model, and the closed loop that it gives
     ///
-    /// R u = T u_c - S y with placed poles (--poles), by a linear-quadratic measure (--lqr) or of minimum variance, for one input and one output of
-    /// any linear model. Beside the coefficients stands what the loop with the model does: its poles, a step of the set point, Ms, margins, what
-    /// the noise of the model makes of output and input, and how many models within the covariance of the parameters make a stable loop.
+    /// R u = T u_c - S y with placed poles (--poles), by a linear-quadratic measure (--lqr) or of minimum variance, for
+    /// one input and one output of any linear model. Beside the coefficients stands what the loop with the model does:
+    /// its poles, a step of the set point, Ms, margins, what the noise of the model makes of output and input, and how
+    /// many models within the covariance of the parameters make a stable loop.
     #[command(after_help = "\
 Examples:
   thetahat control model.json --poles 0.8,0.7
@@ -278,9 +284,10 @@ Examples:
     Control(Box<ControlArguments>),
     /// A fitted model as source code for firmware: Rust, or C99
     ///
-    /// Without a heap, with every number in it: offsets and scales too, so that signals go in and come out in the units of the log. It starts at
-    /// rest at the offsets. With a log a test vector stands beside it: a CSV of inputs, outputs and expected results, and a program that steps
-    /// along it. What a model cannot be is refused, with what it can.
+    /// Without a heap, with every number in it: offsets and scales too, so that signals go in and come out in the units
+    /// of the log. It starts at rest at the offsets. With a log a test vector stands beside it: a CSV of inputs,
+    /// outputs and expected results, and a program that steps along it. What a model cannot be is refused, with what it
+    /// can.
     #[command(after_help = "\
 Examples:
   thetahat export model.json log.csv --to c --what predictor -o firmware
@@ -288,10 +295,10 @@ Examples:
     Export(Box<ExportArguments>),
     /// Make a test signal for an experiment, or say which one a model needs, and for how long
     ///
-    /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period, mean, crest factor,
-    /// order of persistent excitation (a constant has 1, a sinusoid 2) and where its power lies. With --for it compares signals: the
-    /// standard errors that each would give of the model's figures, if model and noise are right, and how many samples it takes
-    /// until they are as small as --want says.
+    /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period,
+    /// mean, crest factor, order of persistent excitation (a constant has 1, a sinusoid 2) and where its power lies.
+    /// With --for it compares signals: the standard errors that each would give of the model's figures, if model and
+    /// noise are right, and how many samples it takes until they are as small as --want says.
     #[command(after_help = "\
 Examples:
   thetahat design --signal prbs:4 --length 2000 --range 20..60 > input.csv
@@ -311,8 +318,8 @@ Example:
 Example:
   thetahat schema > thetahat.report.schema.json")]
     Schema {
-        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, control, track, filter or design writes, or
-        /// the normal equations of a piece of the data
+        /// The document: what fit, validate, compare, inspect, spectrum, step, tune, control, track, filter or design
+        /// writes, or the normal equations of a piece of the data
         #[arg(value_enum, default_value = "report")]
         document: DocumentArgument,
     },

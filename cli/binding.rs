@@ -1,5 +1,5 @@
-//! The stages of the program for a binding to another language. Options are those of the command line and mean the same;
-//! nothing is printed, and nothing is drawn on a terminal.
+//! The stages of the program for a binding to another language. Options are those of the command line and mean the
+//! same; nothing is printed, and nothing is drawn on a terminal.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -48,7 +48,8 @@ pub struct Opened {
     pub warnings: Vec<String>,
 }
 
-/// Reads the logs that `thetahat fit` would with these options. Their clocks may be uneven unless they have to be uniform.
+/// Reads the logs that `thetahat fit` would with these options. Their clocks may be uneven unless they have to be
+/// uniform.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
@@ -119,7 +120,8 @@ pub fn narx_plan(
     job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
 }
 
-/// The plan that `thetahat fit --model ss`, or with several outputs `--model arx`, makes of these options for a log with these channels.
+/// The plan that `thetahat fit --model ss`, or with several outputs `--model arx`, makes of these options for a log
+/// with these channels.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.
@@ -267,7 +269,8 @@ pub fn compare_signals(options: &[OsString], model: &Model) -> Result<Experiment
     compared_signals(&arguments, &DesignJob::resolve(&arguments)?, model, Path::new("model"))
 }
 
-/// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts from.
+/// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts
+/// from.
 ///
 /// # Errors
 /// A [`Failure`] as the program would report it.

@@ -17,10 +17,10 @@ pub(crate) struct Files {
 }
 
 impl Files {
-    /// Refuses, before anything is written, an output that would replace what is read or another output, under whatever name:
-    /// a hard link is the same file, and so is what standard output is redirected to (a program that reads what it writes
-    /// does not end). The same file is told by device and inode. Refuses, before anything is computed, an output that cannot be
-    /// written.
+    /// Refuses, before anything is written, an output that would replace what is read or another output, under whatever
+    /// name: a hard link is the same file, and so is what standard output is redirected to (a program that reads what
+    /// it writes does not end). The same file is told by device and inode. Refuses, before anything is computed, an
+    /// output that cannot be written.
     ///
     /// # Errors
     /// As said; that links go round in a circle.
@@ -98,8 +98,8 @@ enum Identity {
 }
 
 impl Identity {
-    /// Of a file that is to be written, there already or not. None of a device, a pipe or a terminal, which may be read and
-    /// written at once.
+    /// Of a file that is to be written, there already or not. None of a device, a pipe or a terminal, which may be read
+    /// and written at once.
     fn of_output(path: &Path) -> io::Result<Option<Self>> {
         let target = behind_links(path)?;
         if target.exists() {

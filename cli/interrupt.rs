@@ -1,7 +1,8 @@
 //! Ctrl-C and SIGTERM: the program ends, and no file is left half written.
 //!
-//! A search that asks for it ends by itself at its next iteration, and a stream with the row at hand. At any other time, on the
-//! second Ctrl-C, and where that takes longer than a few seconds, the program ends at once, without the file that it was writing.
+//! A search that asks for it ends by itself at its next iteration, and a stream with the row at hand. At any other
+//! time, on the second Ctrl-C, and where that takes longer than a few seconds, the program ends at once, without the
+//! file that it was writing.
 
 use std::fs;
 use std::io;
@@ -142,8 +143,8 @@ pub(crate) fn leaves() {
     state().waker = None;
 }
 
-/// Does what has not written anything and does not ask [`is_ending`]: meanwhile the program ends at once when it has to. None
-/// if it has to end already.
+/// Does what has not written anything and does not ask [`is_ending`]: meanwhile the program ends at once when it has
+/// to. None if it has to end already.
 pub(crate) fn at_once<T>(work: impl FnOnce() -> T) -> Option<T> {
     let waker = {
         let mut state = state();

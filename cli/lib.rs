@@ -1,8 +1,9 @@
-//! The command line of thetahat as a library: [`run`] is the whole program. A binding to another language calls the stages
-//! of the program with the same options, and gets the same tables.
+//! The command line of thetahat as a library: [`run`] is the whole program. A binding to another language calls the
+//! stages of the program with the same options, and gets the same tables.
 //!
-//! `args` is syntax only; `job` resolves it, with every check that needs no data; `log` makes a log of what `thetahat_table` reads;
-//! `commands` has one file a verb. Only this crate opens other files than logs, prints, or knows about terminals.
+//! `args` is syntax only; `job` resolves it, with every check that needs no data; `log` makes a log of what
+//! `thetahat_table` reads; `commands` has one file a verb. Only this crate opens other files than logs, prints, or
+//! knows about terminals.
 
 #[cfg(doctest)]
 mod pages {

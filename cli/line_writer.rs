@@ -120,7 +120,8 @@ impl LineWriter {
         self.written = Written { lines: 1, bytes: self.buffer.len() as u64, ..Written::default() };
     }
 
-    /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off when the next line comes.
+    /// Goes on where an earlier run saved that it was: what a file has beyond that is taken off when the next line
+    /// comes.
     pub(crate) fn resume(
         path: &Path,
         format: Format,

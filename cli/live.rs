@@ -107,8 +107,8 @@ impl Live {
         Ok(())
     }
 
-    /// Seconds since the row before that has a time; none for the first one, without a clock, and where the clock was set
-    /// back.
+    /// Seconds since the row before that has a time; none for the first one, without a clock, and where the clock was
+    /// set back.
     pub(crate) fn step(&self) -> Option<f64> {
         self.step
     }

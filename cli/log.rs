@@ -222,8 +222,9 @@ pub(crate) fn in_pieces<T>(
     })
 }
 
-/// Reads the columns of a log that `choose` names, each part with as many rows of the one before it as it says, and hands them
-/// on with what it chose: memory does not grow with the rows. Gives what the reader should know, in plain words.
+/// Reads the columns of a log that `choose` names, each part with as many rows of the one before it as it says, and
+/// hands them on with what it chose: memory does not grow with the rows. Gives what the reader should know, in plain
+/// words.
 pub(crate) fn in_parts<T>(
     path: &Path,
     job: &LogJob,
@@ -442,7 +443,8 @@ pub(crate) fn open(path: &Path, job: &LogJob) -> Result<Reader, Failure> {
     Ok(Reader::open(path, &options(job))?)
 }
 
-/// Reads the columns of a log that `choose` names. `any_order` is whether a clock that stands still or goes back will do.
+/// Reads the columns of a log that `choose` names. `any_order` is whether a clock that stands still or goes back will
+/// do.
 fn columns(
     reader: Reader,
     path: &Path,
@@ -517,7 +519,8 @@ struct Selected {
     words: Vec<String>,
 }
 
-/// Where the named columns are, and the clock: that of the job, or the one column of the log that is a clock and not among those.
+/// Where the named columns are, and the clock: that of the job, or the one column of the log that is a clock and not
+/// among those.
 fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Result<Selected, Failure> {
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let header = reader.names();

@@ -25,8 +25,9 @@ pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result
     fill(&mut stdout).and_then(|()| stdout.flush()).map_err(|error| Failure::stdout(&error))
 }
 
-/// A name as a cell of a CSV: harmless to a terminal, and to a spreadsheet, which takes what begins with one of a few signs
-/// for a formula and runs it (OWASP, CSV Injection): an apostrophe in front makes it a text. Numbers stay as they are.
+/// A name as a cell of a CSV: harmless to a terminal, and to a spreadsheet, which takes what begins with one of a few
+/// signs for a formula and runs it (OWASP, CSV Injection): an apostrophe in front makes it a text. Numbers stay as they
+/// are.
 pub(crate) fn cell(name: &str) -> String {
     const FORMULA: [char; 8] = ['=', '+', '-', '@', '＝', '＋', '－', '＠'];
     let is_number = name.parse().is_ok_and(f64::is_finite);

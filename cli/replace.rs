@@ -1,9 +1,9 @@
 //! Files that are replaced whole, and files that one run has for itself.
 //!
-//! A file is written beside its place under a passing name, brought to the disk, and moved there: a crash, a full disk or
-//! Ctrl-C leaves the old one or the new one. Whoever writes a file holds its lock (`flock`; `LockFileEx` on Windows), which the
-//! system releases when the program ends in whatever way. So a passing file that nobody holds was left by a run that was
-//! killed, and the next run that writes into its folder removes it.
+//! A file is written beside its place under a passing name, brought to the disk, and moved there: a crash, a full disk
+//! or Ctrl-C leaves the old one or the new one. Whoever writes a file holds its lock (`flock`; `LockFileEx` on
+//! Windows), which the system releases when the program ends in whatever way. So a passing file that nobody holds was
+//! left by a run that was killed, and the next run that writes into its folder removes it.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -50,8 +50,8 @@ pub(crate) fn put(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<(
     Ok(())
 }
 
-/// That a file can be written, before anything is computed for it: its folder takes another one for an instant, or that in which it
-/// will be made.
+/// That a file can be written, before anything is computed for it: its folder takes another one for an instant, or that
+/// in which it will be made.
 ///
 /// # Errors
 /// What [`replace`] would say.
@@ -181,8 +181,8 @@ fn filled(
     Ok(file)
 }
 
-/// An empty file under a passing name, locked. Only its owner can read it, unless it is to be a new file: the user's mask
-/// decides for that, as with any other program.
+/// An empty file under a passing name, locked. Only its owner can read it, unless it is to be a new file: the user's
+/// mask decides for that, as with any other program.
 fn passing(folder: &Path, is_new: bool) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(BEFORE).suffix(AFTER).rand_bytes(LETTERS);

@@ -6,8 +6,8 @@ use std::{env, io, thread};
 
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
 
-/// Starts as many threads as there are cores, or as `RAYON_NUM_THREADS` says; where the system has not so many to give, none, and
-/// the thread that computes does all: rayon would panic. Bits do not depend on it.
+/// Starts as many threads as there are cores, or as `RAYON_NUM_THREADS` says; where the system has not so many to give,
+/// none, and the thread that computes does all: rayon would panic. Bits do not depend on it.
 ///
 /// Inside of a pool, as in Python, that one is used.
 pub(crate) fn share() {
@@ -20,8 +20,8 @@ pub(crate) fn share() {
     let (sender, receiver) = channel();
     let receiver = Arc::new(Mutex::new(receiver));
     let (begins, is_begun) = channel();
-    // One after the other: a thread that has its stack and finds no memory for what it needs besides ends the process, and where all begin
-    // at once, those after it have taken that.
+    // One after the other: a thread that has its stack and finds no memory for what it needs besides ends the process,
+    // and where all begin at once, those after it have taken that.
     let begin = |_| {
         let (receiver, begins) = (Arc::clone(&receiver), begins.clone());
         let begun = thread::Builder::new().spawn(move || {

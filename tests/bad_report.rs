@@ -12,8 +12,8 @@ fn folder() -> Folder {
     folder
 }
 
-/// Predicts and simulates with a report, which must be refused in one line that has all of `parts`; no CSV is written, and
-/// one that is there is left alone.
+/// Predicts and simulates with a report, which must be refused in one line that has all of `parts`; no CSV is written,
+/// and one that is there is left alone.
 fn refused(report: impl AsRef<[u8]>, code: i32, parts: &[&str]) {
     let folder = folder();
     folder.write("model.json", report);

@@ -1,5 +1,5 @@
-//! A headless Chromium, spoken to over two pipes (the DevTools protocol with `--remote-debugging-pipe`: JSON messages, each
-//! ended by a zero byte), and what a page did in it.
+//! A headless Chromium, spoken to over two pipes (the DevTools protocol with `--remote-debugging-pipe`: JSON messages,
+//! each ended by a zero byte), and what a page did in it.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -141,7 +141,8 @@ impl Browser {
         self.wait_for("performance.getEntriesByName('charts-drawn').length === 1");
     }
 
-    /// The processor time in seconds that the page's thread has taken since it was first asked for: that of others does not count.
+    /// The processor time in seconds that the page's thread has taken since it was first asked for: that of others does
+    /// not count.
     pub(crate) fn work(&mut self) -> f64 {
         self.call("Performance.enable", json!({"timeDomain": "threadTicks"}));
         let answer = self.call("Performance.getMetrics", json!({}));

@@ -325,8 +325,8 @@ fn options_of_the_clock_that_exclude_or_need_each_other() {
     }
 }
 
-/// A positioning drive that is logged every millisecond: a slow lag, a lightly damped mode of 150 Hz that no clock of 10 ms
-/// shows, and an encoder. Its setpoint jumps at any millisecond.
+/// A positioning drive that is logged every millisecond: a slow lag, a lightly damped mode of 150 Hz that no clock of
+/// 10 ms shows, and an encoder. Its setpoint jumps at any millisecond.
 fn drive() -> String {
     const ROWS: usize = 20_000;
     let mut random = Random::new(11);

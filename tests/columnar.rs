@@ -1,4 +1,5 @@
-//! Logs in Parquet and Arrow files, of PyArrow and Polars: they are the same log as in text (`tests/data/columnar/make.py`).
+//! Logs in Parquet and Arrow files, of PyArrow and Polars: they are the same log as in text
+//! (`tests/data/columnar/make.py`).
 
 use std::fs;
 use std::path::PathBuf;

@@ -6,8 +6,8 @@ use crate::fit_reference::folder_with;
 use crate::harness::{Folder, number};
 use crate::signals::{Random, csv};
 
-/// Steps from rest, two seconds a row: y is 300 and half of what u has been, with a time constant of 19 s and noise; it drifts
-/// by so much a row.
+/// Steps from rest, two seconds a row: y is 300 and half of what u has been, with a time constant of 19 s and noise; it
+/// drifts by so much a row.
 fn steps(drift: f64) -> Folder {
     let u: Vec<f64> = [0.0, 40.0, 10.0, 60.0].into_iter().flat_map(|u| vec![u; 40]).collect();
     let noise = Random::new(91).signal(u.len());

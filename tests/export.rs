@@ -307,7 +307,8 @@ fn numbers_beyond_single_precision_are_refused_there() {
     }
 }
 
-/// Steps one model along a sample that is infinite, another along one that is NaN: what they say afterwards is the same.
+/// Steps one model along a sample that is infinite, another along one that is NaN: what they say afterwards is the
+/// same.
 const TWO_MODELS: &str = "
 #include \"model.h\"
 #include <math.h>

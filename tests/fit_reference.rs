@@ -1,5 +1,5 @@
-//! Values that other programs found in public logs. Some of these logs are in tests/data/public, the others in the folder that
-//! THETAHAT_LOGS names; tests of those that are absent skip, and say which.
+//! Values that other programs found in public logs. Some of these logs are in tests/data/public, the others in the
+//! folder that THETAHAT_LOGS names; tests of those that are absent skip, and say which.
 
 use std::fs;
 use std::io::Write;
@@ -14,8 +14,8 @@ use thetahat::optimize::Search;
 use crate::harness::{Answer, Folder, number, numbers, parameters};
 use crate::signals::csv;
 
-/// Where a public log is: among those that come with the tests, or in the folder that THETAHAT_LOGS names; where it is absent,
-/// says so.
+/// Where a public log is: among those that come with the tests, or in the folder that THETAHAT_LOGS names; where it is
+/// absent, says so.
 pub(crate) fn public_log(name: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/public");
     let more = std::env::var_os("THETAHAT_LOGS").map(PathBuf::from);

@@ -1,7 +1,8 @@
 //! Who may know whom: rooms stand on floors, and no two modules of a room know each other.
 //!
-//! The floors are those of CONTRIBUTING.md. What a module knows are the paths that it names, `crate::`, `super::` and those of its
-//! own children, each followed through re-exports to the module that has the item. A parent may know its children and they it.
+//! The floors are those of CONTRIBUTING.md. What a module knows are the paths that it names, `crate::`, `super::` and
+//! those of its own children, each followed through re-exports to the module that has the item. A parent may know its
+//! children and they it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,4 +1,5 @@
-//! The files of `fuzz/seeds` and mutations of them, through what is fuzzed there: on any Rust, and the same ones in each run.
+//! The files of `fuzz/seeds` and mutations of them, through what is fuzzed there: on any Rust, and the same ones in
+//! each run.
 //!
 //! `FUZZ=100` makes a hundred times as many.
 

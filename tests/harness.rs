@@ -9,8 +9,8 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// So long a test waits for something that has to happen before it takes it for lost. Nothing else depends on the clock: a
-/// loaded machine is slow, not wrong.
+/// So long a test waits for something that has to happen before it takes it for lost. Nothing else depends on the
+/// clock: a loaded machine is slow, not wrong.
 pub(crate) const HANGS: Duration = Duration::from_secs(120);
 
 /// A temporary folder in which the program runs.
@@ -110,9 +110,9 @@ impl Folder {
     }
 }
 
-/// Gives all that this process starts the default signals, whatever it was started with itself: a script has its jobs in the
-/// background ignore SIGINT, and what is ignored stays so in a new program. What is handled does not (POSIX, `execve`), so this
-/// process handles them, as the default would.
+/// Gives all that this process starts the default signals, whatever it was started with itself: a script has its jobs
+/// in the background ignore SIGINT, and what is ignored stays so in a new program. What is handled does not (POSIX,
+/// `execve`), so this process handles them, as the default would.
 #[cfg(unix)]
 fn handle_signals() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};

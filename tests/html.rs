@@ -138,7 +138,8 @@ fn a_fit_is_shown_with_its_names_as_they_are() {
     let folder = hostile();
     let again = || fs::read(fit_page_of(&folder, "--split 60/20/20")).expect("the case is sound");
     assert!(again() == again(), "the same input gives the same bytes");
-    // Output, two times two correlations, search, delays and runs on rows held out, Bode of input and noise, step, impulse, roots.
+    // Output, two times two correlations, search, delays and runs on rows held out, Bode of input and noise, step,
+    // impulse, roots.
     opened(&mut browser, &folder.path("page.html"), 13);
     stands(&mut browser, "h1", OUTPUT);
     stands(&mut browser, "h1", FILE);

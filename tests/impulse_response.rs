@@ -2,8 +2,8 @@
 
 use crate::harness::{Folder, number};
 
-/// Hair dryer, means removed, 70 taps, samples 70 to 1000: the marginal likelihood by its definition, with dense matrices, maximised by
-/// another program.
+/// Hair dryer, means removed, 70 taps, samples 70 to 1000: the marginal likelihood by its definition, with dense
+/// matrices, maximised by another program.
 #[test]
 fn kernels_are_those_of_an_independent_program() {
     let folder = Folder::with_log(include_str!("data/public/hair_dryer.csv"));

@@ -150,8 +150,8 @@ fn smoothing_ends_while_it_writes() {
     assert!(run.stdout.lines().count() < 4000, "{}", run.stdout.lines().count());
 }
 
-/// Starts to smooth what comes through a pipe, and writes rows to it: more than a pipe holds, so that the program is reading
-/// once they are written.
+/// Starts to smooth what comes through a pipe, and writes rows to it: more than a pipe holds, so that the program is
+/// reading once they are written.
 fn smoothing(folder: &Folder, out: &str, rows: usize) -> (Child, ChildStdin) {
     let mut command = folder.command(&format!("filter walk.toml - --smooth{out}"));
     command.stdin(Stdio::piped());
@@ -165,7 +165,8 @@ fn smoothing(folder: &Folder, out: &str, rows: usize) -> (Child, ChildStdin) {
 #[test]
 fn smoothing_ends_before_it_writes() {
     let folder = walk(10);
-    // On a machine that is fast, or that held this test up, the program comes to its end: there is more to smooth next time.
+    // On a machine that is fast, or that held this test up, the program comes to its end: there is more to smooth next
+    // time.
     let mut rows = 40_000;
     let run = loop {
         let (child, input) = smoothing(&folder, " -o lines.jsonl", rows);

@@ -11,6 +11,7 @@ mod choice;
 mod clock;
 #[cfg(feature = "columnar")]
 mod columnar;
+mod comments;
 mod compare;
 mod constant;
 mod control;

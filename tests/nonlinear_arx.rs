@@ -204,7 +204,8 @@ fn bad_options_and_logs_are_told() {
     }
 }
 
-/// Logs that cannot be used, or not by all maps: a sentence that says what is wrong with what, the exit code, and nothing written.
+/// Logs that cannot be used, or not by all maps: a sentence that says what is wrong with what, the exit code, and
+/// nothing written.
 #[test]
 fn bad_logs_are_told() {
     let folder = Folder::new();
@@ -271,7 +272,8 @@ fn bad_logs_are_told() {
     assert!(folder.names().iter().all(|name| name.ends_with(".csv")), "{:?}", folder.names());
 }
 
-/// What a model says of logs that are not like that of its fit, and of a run without bound: rows without a number are empty.
+/// What a model says of logs that are not like that of its fit, and of a run without bound: rows without a number are
+/// empty.
 #[test]
 fn responses_without_bound_are_told() {
     let folder = Folder::with_log(plant(200));
@@ -308,7 +310,8 @@ fn responses_without_bound_are_told() {
     assert_eq!(run.code, 6, "{}", run.stderr);
 }
 
-/// Products that are named are those that a choice finds, with the same parameters, in the order that they are named in.
+/// Products that are named are those that a choice finds, with the same parameters, in the order that they are named
+/// in.
 #[test]
 fn products_are_taken_by_name() {
     let folder = Folder::with_log(plant(500));
@@ -488,8 +491,8 @@ fn trackers_take_functions() {
     }
 }
 
-/// An additive function of two regressors, with a bend that products of degree two do not have: splines find it, and every verb takes
-/// them.
+/// An additive function of two regressors, with a bend that products of degree two do not have: splines find it, and
+/// every verb takes them.
 #[test]
 fn splines_find_what_bends() {
     let mut state = 7_u32;

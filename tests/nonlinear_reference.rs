@@ -7,7 +7,8 @@ use serde_json::Value;
 use crate::fit_reference::public_log;
 use crate::harness::{Folder, number};
 
-/// A term, its coefficient, the coefficient's standard error, and the term's error reduction ratio, in the order of the choice.
+/// A term, its coefficient, the coefficient's standard error, and the term's error reduction ratio, in the order of the
+/// choice.
 type Term = (&'static str, f64, f64, f64);
 
 const ROBOT_ARM: &[Term] = &[
@@ -226,8 +227,8 @@ fn free_runs_are_those_of_an_independent_program() {
     }
 }
 
-/// The coupled drives: two experiments together, the number of terms by the free run on held-out rows. Each part is a log of its own, so
-/// that runs begin inside of it: after its first ten rows, which are the longest lag.
+/// The coupled drives: two experiments together, the number of terms by the free run on held-out rows. Each part is a
+/// log of its own, so that runs begin inside of it: after its first ten rows, which are the longest lag.
 #[test]
 fn the_coupled_drives_have_as_many_terms_as_run_best() {
     let folder = Folder::new();
@@ -260,8 +261,8 @@ fn the_coupled_drives_have_as_many_terms_as_run_best() {
     }
 }
 
-/// A network of two units for the cascaded tanks, trained for the free run: the optimum that an independent program converged to, from
-/// samples that its scales had been taken from. It is found from at least five of twenty starts.
+/// A network of two units for the cascaded tanks, trained for the free run: the optimum that an independent program
+/// converged to, from samples that its scales had been taken from. It is found from at least five of twenty starts.
 #[test]
 fn a_trained_network_is_the_optimum_of_an_independent_program() {
     let scaled = |log: &str| -> Option<String> {
@@ -308,7 +309,8 @@ fn a_trained_network_is_the_optimum_of_an_independent_program() {
     assert!((test - 0.384_180_5).abs() < 1e-4, "{test}");
 }
 
-/// Products trained for the free run, from the least errors one step ahead, and a network; of the Silverbox and of a robot arm.
+/// Products trained for the free run, from the least errors one step ahead, and a network; of the Silverbox and of a
+/// robot arm.
 #[test]
 fn free_runs_are_trained_to_what_others_reached() {
     let rmse = |folder: &Folder, fresh: String| -> f64 {

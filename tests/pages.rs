@@ -1,5 +1,5 @@
-//! README.md and the pages under docs/ are true: commands print what stands below them, snippets are compiled or are files
-//! that tests use, links lead somewhere, options exist.
+//! README.md and the pages under docs/ are true: commands print what stands below them, snippets are compiled or are
+//! files that tests use, links lead somewhere, options exist.
 //!
 //! Rust snippets are doctests of the command line's crate, Python snippets run in `py/tests/test_pages.py`.
 
@@ -188,8 +188,8 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
     true
 }
 
-/// Runs the commands of a page in a folder of its own, where the demo was and `tests/data` is, and gives how many outputs
-/// were compared.
+/// Runs the commands of a page in a folder of its own, where the demo was and `tests/data` is, and gives how many
+/// outputs were compared.
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");

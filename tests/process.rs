@@ -18,7 +18,8 @@ fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found / expected - 1.0).abs() < tolerance, "{found} {expected}");
 }
 
-/// An independent program: the exact response of each step, least squares for gain and level, Nelder and Mead for the rest.
+/// An independent program: the exact response of each step, least squares for gain and level, Nelder and Mead for the
+/// rest.
 #[test]
 fn a_heater_is_what_an_independent_program_finds() {
     let folder = Folder::with_log(include_str!("data/public/tclab_siso_step.csv"));
@@ -37,8 +38,8 @@ fn a_heater_is_what_an_independent_program_finds() {
     near(number(&report, "/fit/1/rmse"), 0.3126266, 1e-6);
 }
 
-/// The first pulse of a battery cell, without rows that repeat a time: an independent program has R0 = 1.755 mOhm, tau = 7.883 and
-/// 224.3 s, rmse 1.29 mV.
+/// The first pulse of a battery cell, without rows that repeat a time: an independent program has R0 = 1.755 mOhm,
+/// tau = 7.883 and 224.3 s, rmse 1.29 mV.
 #[test]
 fn a_battery_is_what_an_independent_program_finds() {
     let mut log = "t,i,v\n".to_owned();
@@ -195,7 +196,8 @@ fn what_cannot_be_is_told() {
     }
 }
 
-/// Who gives nothing but channels gets a process where the log is a step test, and where one does better than polynomial models.
+/// Who gives nothing but channels gets a process where the log is a step test, and where one does better than
+/// polynomial models.
 ///
 /// Takes 12 s: a choice of a model for each of nine command lines.
 #[test]

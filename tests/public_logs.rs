@@ -1,5 +1,5 @@
-//! Public logs, with nothing known of them: each gets through `inspect` and the default `fit`, and predicts rows that it did
-//! not see about as well as the best ARX(n, n, nk) or better.
+//! Public logs, with nothing known of them: each gets through `inspect` and the default `fit`, and predicts rows that
+//! it did not see about as well as the best ARX(n, n, nk) or better.
 
 use serde_json::Value;
 

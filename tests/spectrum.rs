@@ -1,4 +1,5 @@
-//! `thetahat spectrum` from end to end: reference values, what it writes, and what it refuses; models over what it measured.
+//! `thetahat spectrum` from end to end: reference values, what it writes, and what it refuses; models over what it
+//! measured.
 
 use std::f64::consts::{PI, TAU};
 

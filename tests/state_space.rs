@@ -146,8 +146,8 @@ fn a_filter_that_knows_all_outputs_predicts_as_the_model_does() {
     }
 }
 
-/// The log of the motor without the current in every fifth row, without both outputs in rows 401 to 410, and without the speed in the last
-/// ten and the current in the last five.
+/// The log of the motor without the current in every fifth row, without both outputs in rows 401 to 410, and without
+/// the speed in the last ten and the current in the last five.
 fn with_holes() -> String {
     let mut lines = include_str!("data/dc_motor.csv").lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();

@@ -272,7 +272,8 @@ fn offsets_are_taken_off_or_estimated() {
         let (known, found) = (number(&known, &format!("/{name}")), number(&found, &format!("/{name}")));
         assert!((known - found).abs() < 0.02, "{name}: {known} {found}");
     }
-    // The constant makes up for the first values not being the offsets: 0 = A(1) (y0 - y_1) - B(1) (u0 - u_1) - constant.
+    // The constant makes up for the first values not being the offsets: 0 = A(1) (y0 - y_1) - B(1) (u0 - u_1) -
+    // constant.
     let sum = |names: &[&str]| names.iter().map(|name| number(&found, &format!("/{name}"))).sum::<f64>();
     let expected = (1.0 + sum(&["a1", "a2"])) * (-300.0 - y[0]) - sum(&["b1", "b2"]) * (20.0 - u[0]);
     assert!((number(&found, "/constant") - expected).abs() < 0.1, "{expected} {found}");

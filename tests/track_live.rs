@@ -204,7 +204,8 @@ fn killed_at_any_moment_it_goes_on_as_if_nothing_had_happened() {
             let piece = std::fs::File::create(folder.path("piece")).expect("the folder can be written to");
             let mut child =
                 command.stdin(Stdio::piped()).stdout(piece).stderr(Stdio::null()).spawn().expect("it starts");
-            // It gets the log from its start, some rows more than in the life before, and never its end: it cannot end by itself.
+            // It gets the log from its start, some rows more than in the life before, and never its end: it cannot end
+            // by itself.
             let mut input = child.stdin.take().expect("it is a pipe");
             let given = &log[..row_ends[2_900 * (life + 1) + random.below(100)]];
             thread::scope(|scope| {

@@ -1,4 +1,5 @@
-//! A stream without end: memory does not grow, and the estimate stays near the truth. `make soak-track` takes 10^8 rows.
+//! A stream without end: memory does not grow, and the estimate stays near the truth. `make soak-track` takes 10^8
+//! rows.
 #![cfg(target_os = "linux")]
 
 use std::fs;

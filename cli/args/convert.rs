@@ -14,8 +14,8 @@ pub(crate) struct ConvertArguments {
     /// What to convert it to: continuous, which is continuous time, or a sample time in seconds
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) to: String,
-    /// What inputs do between samples: zoh (they keep their values), foh (they follow straight lines) or tustin (the bilinear
-    /// transformation) [default: that of a model in continuous time, else zoh]
+    /// What inputs do between samples: zoh (they keep their values), foh (they follow straight lines) or tustin (the
+    /// bilinear transformation) [default: that of a model in continuous time, else zoh]
     #[arg(long, value_name = "HOLD")]
     pub(crate) hold: Option<String>,
     /// What to print: a table for people, or the JSON document

@@ -8,8 +8,8 @@ use super::FormatArgument;
 
 #[derive(Debug, Args)]
 pub(crate) struct DesignArguments {
-    /// The signal: prbs, rbs, multisine, chirp, white, sines or steps; after a colon for how many samples each value of prbs, rbs,
-    /// white or steps is held, such as prbs:4. With --for several [default: prbs, with --for all]
+    /// The signal: prbs, rbs, multisine, chirp, white, sines or steps; after a colon for how many samples each value of
+    /// prbs, rbs, white or steps is held, such as prbs:4. With --for several [default: prbs, with --for all]
     #[arg(
         short = 's',
         long,
@@ -36,11 +36,12 @@ pub(crate) struct DesignArguments {
     /// The lowest and the highest frequency of multisine, chirp and sines, in radians per second [default: all]
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Signal")]
     pub(crate) band: Option<String>,
-    /// How many frequencies, each the same factor above the one before: of multisine [default: every line of the period] and sines
-    /// [default: 10]
+    /// How many frequencies, each the same factor above the one before: of multisine [default: every line of the
+    /// period] and sines [default: 10]
     #[arg(long, value_name = "K", help_heading = "Signal")]
     pub(crate) points: Option<usize>,
-    /// Repeat the signal after this many samples [default: of prbs the longest that fits, of multisine 4096 at most, else the length]
+    /// Repeat the signal after this many samples [default: of prbs the longest that fits, of multisine 4096 at most,
+    /// else the length]
     #[arg(long, value_name = "P", help_heading = "Signal")]
     pub(crate) period: Option<usize>,
     /// How many signals without correlation [default: 1, with --for one for each input of the model]
@@ -53,12 +54,12 @@ pub(crate) struct DesignArguments {
     #[arg(long, value_name = "S", default_value_t = 0, help_heading = "Signal")]
     pub(crate) seed: u64,
 
-    /// Compare signals for this model, a report that fit wrote (- for standard input): a table of the standard errors that each would
-    /// give, instead of the signal
+    /// Compare signals for this model, a report that fit wrote (- for standard input): a table of the standard errors
+    /// that each would give, instead of the signal
     #[arg(long = "for", value_name = "REPORT", help_heading = "Worth")]
     pub(crate) model: Option<PathBuf>,
-    /// Say how many samples it takes until these figures have these standard errors: a parameter, dc-gain or time-constant (dc-gain2
-    /// is that of the second input), absolute or in percent of its value
+    /// Say how many samples it takes until these figures have these standard errors: a parameter, dc-gain or
+    /// time-constant (dc-gain2 is that of the second input), absolute or in percent of its value
     #[arg(
         long,
         value_name = "FIGURE:ERROR[,…]",

@@ -12,7 +12,8 @@ pub(crate) struct ExportArguments {
     /// The report that fit wrote, or for a controller the document of control (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// A log for a test vector: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// A log for a test vector: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight
+    /// (- for standard input)
     #[arg(value_name = "LOG")]
     pub(crate) path: Option<PathBuf>,
     /// The language

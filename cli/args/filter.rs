@@ -11,7 +11,8 @@ pub(crate) struct FilterArguments {
     /// The model: a report of fit, or a TOML file with matrices or equations (- for standard input)
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 
@@ -21,8 +22,8 @@ pub(crate) struct FilterArguments {
     /// Where the model of a report starts [default: unknown]
     #[arg(long, value_enum, value_name = "START", help_heading = "Estimator")]
     pub(crate) initial: Option<FilterStartArgument>,
-    /// Standard deviation of white noise in what is measured, in units of each output, beside the noise of the report (nonlinear ARX)
-    /// [default: 0]
+    /// Standard deviation of white noise in what is measured, in units of each output, beside the noise of the report
+    /// (nonlinear ARX) [default: 0]
     #[arg(
         long,
         value_name = "SD[,SD…]",
@@ -47,7 +48,8 @@ pub(crate) struct FilterArguments {
     /// Rows to go through, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B", help_heading = "Channels")]
     pub(crate) rows: Option<String>,
-    /// Add each state given the whole log, later rows too: nothing is written before the log ends, or if Ctrl-C comes first
+    /// Add each state given the whole log, later rows too: nothing is written before the log ends, or if Ctrl-C comes
+    /// first
     #[arg(long, help_heading = "Output")]
     pub(crate) smooth: bool,
 

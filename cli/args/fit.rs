@@ -13,8 +13,8 @@ pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input)
     #[arg(value_name = "LOG", required_unless_present_any = ["from", "list"])]
     pub(crate) logs: Vec<PathBuf>,
-    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input); with --structure or
-    /// --np
+    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input);
+    /// with --structure or --np
     #[arg(
         long,
         value_name = "RESPONSE",
@@ -35,20 +35,20 @@ pub(crate) struct FitArguments {
     /// Rows to validate on
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Channels")]
     pub(crate) validate: Vec<String>,
-    /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K rows); what is
-    /// left of the output's level and slope --constant and --trend estimate
+    /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K rows);
+    /// what is left of the output's level and slope --constant and --trend estimate
     #[arg(long, default_value = "mean", value_name = "WHAT", help_heading = "Channels")]
     pub(crate) detrend: String,
     /// Set a channel's offset by hand
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
-    /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through one Butterworth
-    /// filter; the model and its figures are of the signals as they are
+    /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through one
+    /// Butterworth filter; the model and its figures are of the signals as they are
     #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, help_heading = "Channels")]
     pub(crate) prefilter: Option<String>,
 
-    /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by name, the clock may
-    /// be irregular
+    /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by
+    /// name, the clock may be irregular
     #[arg(
         long,
         value_name = "MODEL",
@@ -81,10 +81,10 @@ pub(crate) struct FitArguments {
     /// What to print: a table for people, or the JSON report
     #[arg(long, value_enum, default_value = "table", help_heading = "Output", conflicts_with = "each")]
     pub(crate) format: FormatArgument,
-    /// Read the logs once, part by part, in memory that does not grow with their rows: the same parameters, of an ARX or AR model of given
-    /// orders, an impulse response, a state-space model without --refine, or a nonlinear ARX model of products (--narx poly with --term,
-    /// --terms or --select mdl). With several outputs orders may be ranges. Figures that need the log again, of free runs and of
-    /// held-out rows, are left out
+    /// Read the logs once, part by part, in memory that does not grow with their rows: the same parameters, of an ARX
+    /// or AR model of given orders, an impulse response, a state-space model without --refine, or a nonlinear ARX model
+    /// of products (--narx poly with --term, --terms or --select mdl). With several outputs orders may be ranges.
+    /// Figures that need the log again, of free runs and of held-out rows, are left out
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "grey", "from", "continuous", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]
@@ -111,8 +111,8 @@ pub(crate) struct ModelArguments {
     /// Coefficients of A: past outputs
     #[arg(long, value_name = "N|A..B", help_heading = "Model")]
     pub(crate) na: Option<String>,
-    /// Which past outputs an output depends on, where an ARX model has several: full, those of all; none, its own; auto, what has the least
-    /// MDL [default: auto]
+    /// Which past outputs an output depends on, where an ARX model has several: full, those of all; none, its own;
+    /// auto, what has the least MDL [default: auto]
     #[arg(long, value_name = "full|none|auto", help_heading = "Model")]
     pub(crate) couple: Option<String>,
     /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
@@ -127,8 +127,8 @@ pub(crate) struct ModelArguments {
     /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
     #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nf: Vec<String>,
-    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default: 1;
-    /// without orders the data choose]
+    /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once [default:
+    /// 1; without orders the data choose]
     #[arg(long, value_name = "N|A..B[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nk: Vec<String>,
     /// Taps of an impulse response (--model fir): g(nk), g(nk+1), …; one value for each input or one for all
@@ -137,9 +137,9 @@ pub(crate) struct ModelArguments {
     /// What is known of an impulse response before the data (--model fir): that it decays and is smooth [default: dc]
     #[arg(long, value_enum, help_heading = "Model")]
     pub(crate) kernel: Option<KernelArgument>,
-    /// What a process in continuous time has (--model process): p, how many lags, then d for a dead time, z a zero, i an integrator, u
-    /// two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct term, as batteries have them. One for
-    /// each input or one for all; the clock may be irregular
+    /// What a process in continuous time has (--model process): p, how many lags, then d for a dead time, z a zero, i
+    /// an integrator, u two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct term, as
+    /// batteries have them. One for each input or one for all; the clock may be irregular
     #[arg(
         long,
         value_name = "p1d|p2du|rc2|…[,…]",
@@ -148,8 +148,8 @@ pub(crate) struct ModelArguments {
         group = "continuous"
     )]
     pub(crate) structure: Vec<String>,
-    /// Poles of a transfer function in continuous time (--model tf), 1 to 6; one number for each input or one for all; the clock may be
-    /// irregular
+    /// Poles of a transfer function in continuous time (--model tf), 1 to 6; one number for each input or one for all;
+    /// the clock may be irregular
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model", group = "continuous")]
     pub(crate) np: Vec<usize>,
     /// Its zeros, no more than poles; one number for each input or one for all [default: one less than poles]
@@ -161,20 +161,20 @@ pub(crate) struct ModelArguments {
     /// How to estimate
     #[arg(long, value_enum, default_value = "pem", help_heading = "Model")]
     pub(crate) method: MethodArgument,
-    /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing outputs (models
-    /// without D and F)
+    /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing outputs
+    /// (models without D and F)
     #[arg(long, value_enum, default_value = "conditional", help_heading = "Model")]
     pub(crate) likelihood: LikelihoodArgument,
     /// What stands before the first sample of a segment
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) initial: InitialArgument,
-    /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone), or a number
-    /// of steps ahead. auto: prediction, unless without orders another model simulates rows held out from it clearly better; of networks
-    /// and rbf-free simulation where there are inputs
+    /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone),
+    /// or a number of steps ahead. auto: prediction, unless without orders another model simulates rows held out from
+    /// it clearly better; of networks and rbf-free simulation where there are inputs
     #[arg(long, value_name = "auto|prediction|simulation|K", default_value = "auto", help_heading = "Model")]
     pub(crate) focus: String,
-    /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and other logs
-    /// of which the mean is not where the plant rests
+    /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and
+    /// other logs of which the mean is not where the plant rests
     #[arg(long, value_enum, default_value = "auto", help_heading = "Model")]
     pub(crate) constant: ConstantArgument,
     /// Estimate a slope of the output with the parameters too, and its level with it: for drift
@@ -195,15 +195,16 @@ pub(crate) struct StateSpaceArguments {
     /// Future samples that the states are to tell of [default: as many as past ones]
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub(crate) future: Option<u32>,
-    /// Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future inputs [default: ssarx]
+    /// Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future inputs
+    /// [default: ssarx]
     #[arg(long, value_name = "METHOD")]
     pub(crate) weighting: Option<String>,
-    /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen that feeds outputs back to
-    /// the inputs [default: auto]
+    /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen that
+    /// feeds outputs back to the inputs [default: auto]
     #[arg(long, value_enum)]
     pub(crate) feedthrough: Option<FeedthroughArgument>,
-    /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles, gains and responses then
-    /// have standard errors
+    /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles, gains
+    /// and responses then have standard errors
     #[arg(long, value_name = "prediction|simulation")]
     pub(crate) refine: Option<String>,
 }
@@ -222,8 +223,8 @@ pub(crate) enum FeedthroughArgument {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Nonlinear ARX")]
 pub(crate) struct NarxArguments {
-    /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains most of what is left
-    /// comes next, or with a network or radial basis functions that are trained
+    /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains
+    /// most of what is left comes next, or with a network or radial basis functions that are trained
     #[arg(
         long,
         value_enum,
@@ -235,48 +236,54 @@ pub(crate) struct NarxArguments {
         ]
     )]
     pub(crate) narx: Option<MapArgument>,
-    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2; with auto also as
-    /// the linear model that the data choose]
+    /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all [default: 2; with auto
+    /// also as the linear model that the data choose]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
     pub(crate) ny: Vec<usize>,
-    /// Values of each input that g reads, from --nk on: u(k-nk), …; one number for each input or one for all [default: 2]
+    /// Values of each input that g reads, from --nk on: u(k-nk), …; one number for each input or one for all [default:
+    /// 2]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx")]
     pub(crate) nu: Vec<usize>,
-    /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once for each
+    /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once for
+    /// each
     #[arg(long, value_name = "EXPRESSION", requires = "narx", allow_hyphen_values = true)]
     pub(crate) regressor: Vec<String>,
     /// Factors of a product at most (poly) [default: 2]
     #[arg(long, value_name = "D", requires = "narx")]
     pub(crate) degree: Option<usize>,
-    /// How many functions to take [default: --select says it, by the free run on validation rows, or on blocks of the estimation rows]
+    /// How many functions to take [default: --select says it, by the free run on validation rows, or on blocks of the
+    /// estimation rows]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "select")]
     pub(crate) terms: Option<usize>,
-    /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it they are chosen
+    /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it they
+    /// are chosen
     #[arg(long, value_name = "PRODUCT", requires = "narx", conflicts_with_all = ["terms", "most_terms", "select", "degree"])]
     pub(crate) term: Vec<String>,
     /// How many functions to look at [default: 40, and 10 local models]
     #[arg(long, value_name = "N", requires = "narx", conflicts_with = "terms")]
     pub(crate) most_terms: Option<usize>,
-    /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N in each direction,
-    /// or at N pseudo-random points [default: chosen]
+    /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N
+    /// in each direction, or at N pseudo-random points [default: chosen]
     #[arg(long, value_name = "chosen|kmeans:N|grid:N|random:N", requires = "narx")]
     pub(crate) centres: Option<String>,
-    /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so that neighbours overlap]
+    /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so that
+    /// neighbours overlap]
     #[arg(long, value_name = "SIGMA", requires = "narx", allow_hyphen_values = true)]
     pub(crate) width: Option<f64>,
-    /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place of planes (local), or
-    /// means (knn)
+    /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place of
+    /// planes (local), or means (knn)
     #[arg(long, requires = "narx")]
     pub(crate) no_linear: bool,
     /// How local models share the space of the regressors (local) [default: gaussian]
     #[arg(long, value_enum, value_name = "SHAPE", requires = "narx")]
     pub(crate) membership: Option<MembershipArgument>,
-    /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn) [default: chosen]; bends of
-    /// each regressor (spline) [default: 5]; units that are drawn (step, --drawn) [default: 100]
+    /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn)
+    /// [default: chosen]; bends of each regressor (spline) [default: 5]; units that are drawn (step, --drawn) [default:
+    /// 100]
     #[arg(long, value_name = "N", requires = "narx")]
     pub(crate) units: Option<usize>,
-    /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else they are trained. Those of
-    /// step are always drawn
+    /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else they
+    /// are trained. Those of step are always drawn
     #[arg(long, requires = "narx")]
     pub(crate) drawn: bool,
     /// Leave signals in their own units: else each is divided by its standard deviation
@@ -350,8 +357,8 @@ pub(crate) struct ChoiceArguments {
     /// What makes one model better than another [default: mdl]
     #[arg(long, value_name = "CRITERION", value_parser = selects())]
     pub(crate) select: Option<Select>,
-    /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted again to
-    /// the first two and evaluated on the third; 0 for a part that is not wanted
+    /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted
+    /// again to the first two and evaluated on the third; 0 for a part that is not wanted
     #[arg(long, value_name = "E/V/T", conflicts_with = "validate", allow_hyphen_values = true)]
     pub(crate) split: Option<String>,
 }
@@ -387,9 +394,9 @@ pub(crate) struct SearchArguments {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Criterion (all but --norm for models without C, D and F)")]
 pub(crate) struct CriterionArguments {
-    /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber[:K], of squares
-    /// up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not said); inf, the largest error
-    /// [default: 2]
+    /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule;
+    /// huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not
+    /// said); inf, the largest error [default: 2]
     #[arg(long, value_name = "2|1|huber[:K]|inf", allow_hyphen_values = true)]
     pub(crate) norm: Option<String>,
     /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
@@ -458,7 +465,8 @@ pub(crate) enum InitialArgument {
     Drop,
     /// Zeros
     Zero,
-    /// What was measured before, and what fits best, found with the parameters (models with F, processes, or --likelihood exact with inputs)
+    /// What was measured before, and what fits best, found with the parameters (models with F, processes, or
+    /// --likelihood exact with inputs)
     Estimate,
 }
 

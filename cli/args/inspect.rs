@@ -8,11 +8,13 @@ use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, Names};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct InspectArguments {
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG", required_unless_present = "list")]
     pub(crate) logs: Vec<PathBuf>,
 
-    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …, if they are there]
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …, if they
+    /// are there]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
     /// Output column [default: y, if it is there]
@@ -36,8 +38,8 @@ pub(crate) struct InspectArguments {
     /// Write a page with charts to a file too
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) html: Option<PathBuf>,
-    /// Read the log once, part by part, in memory that does not grow with its rows. What needs the whole log at once is left out, or is
-    /// that of the first rows; the warnings say so
+    /// Read the log once, part by part, in memory that does not grow with its rows. What needs the whole log at once is
+    /// left out, or is that of the first rows; the warnings say so
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]

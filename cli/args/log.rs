@@ -14,7 +14,8 @@ pub(crate) struct LiveClockArguments {
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S
     #[arg(long, value_name = "FORMAT", requires = "time")]
     pub(crate) time_format: Option<String>,
-    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times, else s]
+    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times,
+    /// else s]
     #[arg(long, value_name = "UNIT", requires = "time")]
     pub(crate) time_unit: Option<String>,
     /// Seconds from one row to the next [default: that of the model; for track with --time, the first step]
@@ -44,8 +45,8 @@ impl Names {
 /// How a log is written.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct LogArguments {
-    /// What separates fields: a character, tab, or blanks for runs of them [default: recognised among comma, semicolon, tab and
-    /// blanks]
+    /// What separates fields: a character, tab, or blanks for runs of them [default: recognised among comma, semicolon,
+    /// tab and blanks]
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
     pub(crate) delimiter: Option<String>,
     /// Numbers have a decimal comma, or =no, a point [default: recognised by the first rows]
@@ -59,7 +60,8 @@ pub(crate) struct LogArguments {
         help_heading = "Log format"
     )]
     pub(crate) decimal_comma: Option<bool>,
-    /// The line that has the names of the columns; what is above is left out [default: the last line of words above the rows]
+    /// The line that has the names of the columns; what is above is left out [default: the last line of words above the
+    /// rows]
     #[arg(long, value_name = "LINE", conflicts_with = "no_header", help_heading = "Log format")]
     pub(crate) header_row: Option<u64>,
     /// The first row is data; columns are called 1, 2, …
@@ -95,14 +97,15 @@ pub(crate) struct LogArguments {
 /// The log's clock.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ClockArguments {
-    /// The column of times: numbers, dates, or the timestamps and durations of a Parquet or Arrow file; two columns, of dates and of
-    /// times of day, as DATE,TIME [default: the one column that is a clock by its name and its values]
+    /// The column of times: numbers, dates, or the timestamps and durations of a Parquet or Arrow file; two columns, of
+    /// dates and of times of day, as DATE,TIME [default: the one column that is a clock by its name and its values]
     #[arg(long, value_name = "NAME", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time: Option<String>,
     /// How times are written, in the manner of strptime, such as %d.%m.%Y %H:%M:%S [default: recognised]
     #[arg(long, value_name = "FORMAT", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_format: Option<String>,
-    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times, else s]
+    /// The unit of times that are numbers: ns, us, ms, s, min, h or d [default: by the name and the size of the times,
+    /// else s]
     #[arg(long, value_name = "UNIT", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_unit: Option<String>,
     /// The time zone of dates without one, such as Europe/Berlin, for logs in which clocks are set
@@ -111,8 +114,9 @@ pub(crate) struct ClockArguments {
     /// Seconds from one row to the next [default: by the clock; without one 1, so that times count rows]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, help_heading = "Clock")]
     pub(crate) sample_time: Option<f64>,
-    /// Put a log on another clock: a step in seconds, and how values between samples are read; auto holds channels that move in steps. A step of two recorded ones or
-    /// more is filtered against aliasing first, unless :unfiltered is added or the clock is irregular
+    /// Put a log on another clock: a step in seconds, and how values between samples are read; auto holds channels that
+    /// move in steps. A step of two recorded ones or more is filtered against aliasing first, unless :unfiltered is
+    /// added or the clock is irregular
     #[arg(
         long,
         value_name = "STEP:hold|linear|auto[:unfiltered]",

@@ -20,7 +20,8 @@ pub(crate) struct PredictArguments {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArguments {
-    /// Keep what is fed back within 1.1 times the range of the estimation rows, and count how often (nonlinear ARX models)
+    /// Keep what is fed back within 1.1 times the range of the estimation rows, and count how often (nonlinear ARX
+    /// models)
     #[arg(long, conflicts_with = "draws")]
     pub(crate) clamp: bool,
     /// Draw this many runs of what the model leaves open: its noise, and its parameters within their covariance
@@ -83,7 +84,8 @@ pub(crate) struct RespondArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
     /// Rows to respond to, 1-based and inclusive [default: all]

@@ -8,7 +8,8 @@ use super::{ClockArguments, LogArguments, Names};
 
 #[derive(Debug, Args)]
 pub(crate) struct SpectrumArguments {
-    /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input); several are several experiments with one plant
+    /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input);
+    /// several are several experiments with one plant
     #[arg(value_name = "LOG", required = true, num_args = 1..)]
     pub(crate) paths: Vec<PathBuf>,
     /// Rows to use, 1-based and inclusive; each range is a segment of its own [default: all]

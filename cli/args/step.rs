@@ -8,8 +8,8 @@ use super::{ClockArguments, FormatArgument, LogArguments};
 
 #[derive(Debug, Args)]
 pub(crate) struct StepArguments {
-    /// The log of a step test (CSV, gzip-compressed or not, Parquet or Arrow), the report that fit wrote, or the JSON document of spectrum (- for standard
-    /// input); a file that begins with { is a document
+    /// The log of a step test (CSV, gzip-compressed or not, Parquet or Arrow), the report that fit wrote, or the JSON
+    /// document of spectrum (- for standard input); a file that begins with { is a document
     #[arg(value_name = "FILE")]
     pub(crate) path: PathBuf,
 

@@ -9,11 +9,13 @@ use super::{LineArguments, LiveClockArguments, LogArguments, MapArgument, Names}
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArguments {
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG")]
     pub(crate) path: PathBuf,
 
-    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those of --warm]
+    /// Input columns; a name that holds a comma stands between double quotes, as in CSV [default: u, u1, u2, …; those
+    /// of --warm]
     #[arg(short = 'u', long, value_name = "NAME[,NAME…]", help_heading = "Channels")]
     pub(crate) input: Vec<Names>,
     /// Output columns; with --model arx more than one, an equation for each [default: y; those of --warm]
@@ -22,8 +24,8 @@ pub(crate) struct TrackArguments {
     /// Subtract this from a channel [default: 0; the offsets of --warm]
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) offset: Vec<String>,
-    /// The typical magnitude of a channel; a factor of 3 does not matter [default: the largest of the first rows, from which
-    /// then nothing is predicted]
+    /// The typical magnitude of a channel; a factor of 3 does not matter [default: the largest of the first rows, from
+    /// which then nothing is predicted]
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Channels")]
     pub(crate) scale: Vec<String>,
 
@@ -33,7 +35,8 @@ pub(crate) struct TrackArguments {
     /// Coefficients of A: past outputs
     #[arg(long, value_name = "N", help_heading = "Model")]
     pub(crate) na: Option<usize>,
-    /// Which past outputs an output depends on, where there are several: full, those of all; none, its own [default: full]
+    /// Which past outputs an output depends on, where there are several: full, those of all; none, its own [default:
+    /// full]
     #[arg(long, value_name = "full|none", conflicts_with = "narx", help_heading = "Model")]
     pub(crate) couple: Option<String>,
     /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
@@ -45,8 +48,8 @@ pub(crate) struct TrackArguments {
     /// Samples from input to first effect, one value for each input or one for all [default: 1]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', help_heading = "Model")]
     pub(crate) nk: Vec<usize>,
-    /// Track y(k) = g(past outputs and inputs) + e(k) instead: all products of lags up to a degree (poly). Functions that a fit has chosen
-    /// come from its report, with --warm
+    /// Track y(k) = g(past outputs and inputs) + e(k) instead: all products of lags up to a degree (poly). Functions
+    /// that a fit has chosen come from its report, with --warm
     #[arg(
         long,
         value_enum,
@@ -58,15 +61,15 @@ pub(crate) struct TrackArguments {
     /// Past outputs that g reads: y(k-1), …, y(k-N) [default: 2]
     #[arg(long, value_name = "N", requires = "narx", help_heading = "Model")]
     pub(crate) ny: Option<usize>,
-    /// Values of each input that g reads, from --nk on; one number for each input or one for all, 0 for a model without inputs
-    /// [default: 2]
+    /// Values of each input that g reads, from --nk on; one number for each input or one for all, 0 for a model without
+    /// inputs [default: 2]
     #[arg(long, value_name = "N[,…]", value_delimiter = ',', requires = "narx", help_heading = "Model")]
     pub(crate) nu: Vec<usize>,
     /// Factors of a product at most [default: 2]
     #[arg(long, value_name = "D", requires = "narx", help_heading = "Model")]
     pub(crate) degree: Option<usize>,
-    /// Estimate a constant too, for channels of which the offsets are not known; without --offset the first value of each is
-    /// taken off
+    /// Estimate a constant too, for channels of which the offsets are not known; without --offset the first value of
+    /// each is taken off
     #[arg(long, help_heading = "Model")]
     pub(crate) constant: bool,
 
@@ -97,17 +100,18 @@ pub(crate) struct TrackArguments {
     /// Do not adapt where the innovation is smaller than this, in units of the output
     #[arg(long, value_name = "WIDTH", allow_hyphen_values = true, help_heading = "Adaptation")]
     pub(crate) dead_zone: Option<f64>,
-    /// What becomes of rows whose innovations are far larger than the noise makes them: used; huber:THRESHOLD (one of more than
-    /// THRESHOLD standard deviations corrects as one of so many); gate:NIS:RELEASE (above NIS, the square of that, it corrects nothing;
-    /// after RELEASE in a row the next ones do). huber is huber:3, gate is gate:25:20 [default: used]
+    /// What becomes of rows whose innovations are far larger than the noise makes them: used; huber:THRESHOLD (one of
+    /// more than THRESHOLD standard deviations corrects as one of so many); gate:NIS:RELEASE (above NIS, the square of
+    /// that, it corrects nothing; after RELEASE in a row the next ones do). huber is huber:3, gate is gate:25:20
+    /// [default: used]
     #[arg(long, value_name = "HOW", help_heading = "Adaptation")]
     pub(crate) outliers: Option<String>,
 
     /// Add to each row a forecast of the output this many rows later, inputs held at their last value
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Watch")]
     pub(crate) horizon: Option<u32>,
-    /// Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two false alarms on
-    /// average
+    /// Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two false
+    /// alarms on average
     #[arg(long, value_name = "SAMPLES", allow_hyphen_values = true, help_heading = "Watch")]
     pub(crate) alarm: Option<f64>,
     /// End at the first alarm, with exit code 7

@@ -14,8 +14,8 @@ pub(crate) struct TuneArguments {
     /// The input that the controller moves [default: the only one]
     #[arg(short = 'u', long, value_name = "NAME")]
     pub(crate) input: Option<String>,
-    /// The time constant that the closed loop shall have, tau_c or lambda, in seconds [default: the dead time by SIMC, the longer of lag and
-    /// dead time by lambda tuning]
+    /// The time constant that the closed loop shall have, tau_c or lambda, in seconds [default: the dead time by SIMC,
+    /// the longer of lag and dead time by lambda tuning]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) lambda: Option<f64>,
     /// Which controller [default: both]

@@ -11,12 +11,13 @@ pub(crate) struct ValidateArguments {
     /// The report that fit wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG", required_unless_present = "list")]
     pub(crate) logs: Vec<PathBuf>,
     /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
-    /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E, largest-error@K<=E,
-    /// coverage>=P (of the 95 % intervals); exit code 6 if it does not
+    /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E,
+    /// largest-error@K<=E, coverage>=P (of the 95 % intervals); exit code 6 if it does not
     #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
     pub(crate) require: Vec<String>,
     #[command(flatten)]
@@ -30,10 +31,12 @@ pub(crate) struct CompareArguments {
     /// The reports that fit wrote (- for standard input)
     #[arg(value_name = "REPORT", required = true, num_args = 1..)]
     pub(crate) reports: Vec<PathBuf>,
-    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard input)
+    /// The log: a CSV file, gzip-compressed or not, a Parquet or an Arrow file, or the log of a flight (- for standard
+    /// input)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) path: PathBuf,
-    /// Lay the models over a measured frequency response too, the JSON document of spectrum: how many of its points each misses
+    /// Lay the models over a measured frequency response too, the JSON document of spectrum: how many of its points
+    /// each misses
     #[arg(long, value_name = "RESPONSE")]
     pub(crate) over: Option<PathBuf>,
     #[command(flatten)]

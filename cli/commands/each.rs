@@ -1,8 +1,9 @@
 //! Many logs, each by itself: a table with a row for each, and a folder with the document of each.
 //!
-//! A row has the log's name, the exit code that the verb would have had with this log alone, and its message; then what the
-//! document says ([`Row`]). Logs are shared out to threads one by one, and rows stand in the order of the logs, so that what is
-//! written does not depend on the number of threads. Where there are no more logs than threads, each of them gets several.
+//! A row has the log's name, the exit code that the verb would have had with this log alone, and its message; then what
+//! the document says ([`Row`]). Logs are shared out to threads one by one, and rows stand in the order of the logs, so
+//! that what is written does not depend on the number of threads. Where there are no more logs than threads, each of
+//! them gets several.
 
 mod journal;
 mod logs;
@@ -42,7 +43,8 @@ pub(super) struct Done {
 }
 
 impl Done {
-    /// What a document says in a row, and what the reader should know: what was said while it was made, then its own warnings.
+    /// What a document says in a row, and what the reader should know: what was said while it was made, then its own
+    /// warnings.
     pub(super) fn new(
         document: &impl Document,
         row: Row,
@@ -65,7 +67,8 @@ impl Done {
 /// `common` is what the work depends on beside the log, in words that differ where it does.
 ///
 /// # Errors
-/// As said of the logs' names; that something cannot be written; that a gate is not met by some log; that all logs failed.
+/// As said of the logs' names; that something cannot be written; that a gate is not met by some log; that all logs
+/// failed.
 pub(super) fn each(
     arguments: &EachArguments,
     patterns: &[PathBuf],
@@ -280,8 +283,8 @@ fn write(path: &Path, rows: &[Row]) -> Result<(), Failure> {
     })
 }
 
-/// Says how many logs went how, and what is the exit code of all: that of a gate which some log did not meet; where no log
-/// went well, that of the first.
+/// Says how many logs went how, and what is the exit code of all: that of a gate which some log did not meet; where no
+/// log went well, that of the first.
 fn end(table: &Path, rows: &[Row], reused: usize) -> Result<(), Failure> {
     let code = |row: &Row| match row.get("exit_code") {
         Some(Cell::Count(code)) => *code,

@@ -109,7 +109,8 @@ fn inspected_in(
     Ok((inspection, kept))
 }
 
-/// The inspection of a log that is read whole, what the reader should know of how it was read, and what was read, if it is wanted.
+/// The inspection of a log that is read whole, what the reader should know of how it was read, and what was read, if it
+/// is wanted.
 fn whole(
     reader: Reader,
     job: &InspectJob,

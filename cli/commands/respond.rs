@@ -161,7 +161,8 @@ enum RowName {
 }
 
 impl RowClock<'_> {
-    /// The time of a row (0-based), as the log has it, where there are times; those after the end of the log go on in its own step.
+    /// The time of a row (0-based), as the log has it, where there are times; those after the end of the log go on in
+    /// its own step.
     fn at(&self, position: usize) -> RowName {
         let rows = self.log.rows();
         let beyond = (position + 1).saturating_sub(rows) as f64 * self.log.sample_time();

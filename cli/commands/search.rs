@@ -25,7 +25,8 @@ pub(super) struct Identified {
 pub(super) enum Telling {
     /// At once, on standard error.
     Aloud,
-    /// As one of many: what the reader should know is kept, nothing is drawn, and who has the many under way ends when asked to.
+    /// As one of many: what the reader should know is kept, nothing is drawn, and who has the many under way ends when
+    /// asked to.
     Kept(RefCell<Vec<String>>),
 }
 

@@ -56,8 +56,8 @@ pub(crate) fn step(arguments: &StepArguments, line: &str) -> Result<(), Failure>
     transient::respond(&what, path, &model, samples, &arguments.out, arguments.html.as_deref(), line)
 }
 
-/// Whether a file is JSON: whether the first that is not blank is {. What comes on standard input is not used up. A pipe that has a name
-/// cannot be read twice: it is taken for a document.
+/// Whether a file is JSON: whether the first that is not blank is {. What comes on standard input is not used up. A
+/// pipe that has a name cannot be read twice: it is taken for a document.
 fn is_json(path: &Path) -> Result<bool, Failure> {
     let failed = |error| Failure::io(path, "cannot be read", &error);
     let begins = |head: &[u8]| {

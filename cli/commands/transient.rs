@@ -1,4 +1,5 @@
-//! `thetahat step` of a model and `thetahat impulse`: what a stored model's output does after a step or an impulse of its inputs.
+//! `thetahat step` of a model and `thetahat impulse`: what a stored model's output does after a step or an impulse of
+//! its inputs.
 
 use std::path::Path;
 

@@ -5,9 +5,9 @@
 //! J dw/dt = K i - b w - load       speed w [rad/s], load torque [N m]
 //! ```
 //!
-//! The voltage switches between 2 V and 8 V at random, the load is a small random torque that holds for a sample, and the
-//! speed is measured every 10 ms with noise. Write the log anew with
-//! `cargo run --example dc_motor > cli/demo/dc_motor.csv`.
+//! The voltage switches between 2 V and 8 V at random, the load is a small random torque that holds for a sample, and
+//! the speed is measured every 10 ms with noise. Write the log anew with `cargo run --example dc_motor >
+//! cli/demo/dc_motor.csv`.
 
 use std::fmt::Write;
 

@@ -48,7 +48,8 @@ impl DesignJob {
         SignalPlan { waveform, ..self.shared.clone() }
     }
 
-    /// The signals that are compared for a model. What only some kinds have, a band and a number of frequencies, is that of these.
+    /// The signals that are compared for a model. What only some kinds have, a band and a number of frequencies, is
+    /// that of these.
     pub(crate) fn plans(
         &self,
         arguments: &DesignArguments,

@@ -34,11 +34,11 @@ impl InspectJob {
         self.inputs.is_some() || self.output.is_some()
     }
 
-    /// The line of `thetahat fit` that goes with what was found, ready for a POSIX shell. It names the log as it was named
-    /// here, how it is read, its channels without inputs that excite nothing or repeat another, and a resampling where the clock
-    /// needs one. For a step test that begins at rest it takes the offsets from there, and asks for a time constant, a gain and
-    /// a delay from each input: what steps show, by the whole of each response. None where a fit would refuse: without an
-    /// output that changes, or a clock that can be used.
+    /// The line of `thetahat fit` that goes with what was found, ready for a POSIX shell. It names the log as it was
+    /// named here, how it is read, its channels without inputs that excite nothing or repeat another, and a resampling
+    /// where the clock needs one. For a step test that begins at rest it takes the offsets from there, and asks for a
+    /// time constant, a gain and a delay from each input: what steps show, by the whole of each response. None where a
+    /// fit would refuse: without an output that changes, or a clock that can be used.
     pub(crate) fn command(&self, arguments: &InspectArguments, inspection: &Inspection) -> Option<String> {
         let output = inspection.channels.iter().find(|channel| channel.role.as_deref() == Some("output"))?;
         if output.minimum == output.maximum {

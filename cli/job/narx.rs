@@ -12,8 +12,8 @@ use crate::args::{FitArguments, MapArgument, MembershipArgument, Names, NarxArgu
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
-/// Bends of each regressor. Natural splines seldom need more than five knots (Stone, Statistical Science 1, 1986); these have seven, of
-/// which a choice leaves out what is not needed.
+/// Bends of each regressor. Natural splines seldom need more than five knots (Stone, Statistical Science 1, 1986);
+/// these have seven, of which a choice leaves out what is not needed.
 const BENDS: usize = 5;
 
 /// A nonlinear ARX model to fit.
@@ -115,7 +115,8 @@ impl NarxJob {
     }
 }
 
-/// What is for nonlinear models alone, given for another one: where one option excludes --narx, the parser asks for it no longer.
+/// What is for nonlinear models alone, given for another one: where one option excludes --narx, the parser asks for it
+/// no longer.
 pub(crate) fn check_linear(arguments: &NarxArguments) -> Result<(), Failure> {
     let given = [
         ("--ny", !arguments.ny.is_empty()),

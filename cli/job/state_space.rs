@@ -38,8 +38,8 @@ pub(crate) struct StateSpaceJob {
 }
 
 impl StateSpaceJob {
-    /// The job, if a model in state space is asked for, or several outputs and no other model than ARX. A log that is there already may
-    /// have several outputs without their names.
+    /// The job, if a model in state space is asked for, or several outputs and no other model than ARX. A log that is
+    /// there already may have several outputs without their names.
     pub(crate) fn resolve(arguments: &FitArguments, has_several: bool) -> Result<Option<Self>, Failure> {
         let (own, model) = (&arguments.states, &arguments.model);
         let outputs = Names::all(&arguments.output).unwrap_or_default();

@@ -44,8 +44,8 @@ impl StepTestJob {
 }
 
 impl StepArguments {
-    /// Refuses what is for a log where the file is a document, `what` kind of one; of a frequency response the options that say which
-    /// input and what to write have a meaning.
+    /// Refuses what is for a log where the file is a document, `what` kind of one; of a frequency response the options
+    /// that say which input and what to write have a meaning.
     pub(crate) fn check_document(&self, what: &str, is_response: bool) -> Result<(), Failure> {
         let (log, clock) = (&self.log, &self.clock);
         let of_logs = [

@@ -1,8 +1,8 @@
-//! What is fuzzed: bytes go into all that reads them, and what was read goes into every verb of the library. Whatever the bytes
-//! are, nothing panics, takes memory without a bound, or goes on for ever; errors are values.
+//! What is fuzzed: bytes go into all that reads them, and what was read goes into every verb of the library. Whatever
+//! the bytes are, nothing panics, takes memory without a bound, or goes on for ever; errors are values.
 //!
-//! The targets of cargo-fuzz in `fuzz_targets` call these functions. So does `tests/fuzz.rs` of the main workspace, on any Rust,
-//! with the seeds and with mutations of them.
+//! The targets of cargo-fuzz in `fuzz_targets` call these functions. So does `tests/fuzz.rs` of the main workspace, on
+//! any Rust, with the seeds and with mutations of them.
 
 use std::f64::consts::PI;
 use std::io::Write;
@@ -75,7 +75,8 @@ fn read(path: &Path, options: &Options) {
     while let Ok(Event::Row | Event::Malformed(_) | Event::Idle) = stream.advance() {}
 }
 
-/// A model in equations or matrices, written in TOML: its filters take some rows, and its unknown parameters are fitted to some.
+/// A model in equations or matrices, written in TOML: its filters take some rows, and its unknown parameters are fitted
+/// to some.
 pub fn equations(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
     if let Ok(model) = StateModel::from_toml(text) {

@@ -1,5 +1,5 @@
-//! NumPy arrays in and out. Contiguous arrays of float64 are read where they are. Whatever else holds numbers is converted
-//! once, by the package's one conversion; shapes are checked and never guessed.
+//! NumPy arrays in and out. Contiguous arrays of float64 are read where they are. Whatever else holds numbers is
+//! converted once, by the package's one conversion; shapes are checked and never guessed.
 
 use numpy::{
     PyArray1, PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArray,
@@ -30,8 +30,8 @@ pub(crate) fn numbers<'py>(
     }
 }
 
-/// The entries of one channel: an array of one dimension, or of one column, with `length` entries, or at least one where
-/// no length is asked for.
+/// The entries of one channel: an array of one dimension, or of one column, with `length` entries, or at least one
+/// where no length is asked for.
 pub(crate) fn vector<'py>(
     argument: &str,
     value: &Bound<'py, PyAny>,
@@ -51,8 +51,8 @@ pub(crate) fn vector<'py>(
     }
 }
 
-/// An array of two dimensions, row by row: `None` stands for any number of rows or columns but none. One column may be an
-/// array of one dimension.
+/// An array of two dimensions, row by row: `None` stands for any number of rows or columns but none. One column may be
+/// an array of one dimension.
 pub(crate) fn matrix<'py>(
     argument: &str,
     value: &Bound<'py, PyAny>,

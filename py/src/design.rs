@@ -16,12 +16,12 @@ use crate::work::{awaited, interruptible};
 /// An array of one dimension.
 type Column<'py> = Bound<'py, PyArray1<f64>>;
 
-/// Mean, root mean square, crest factor, order of persistent excitation, the highest order tried, and the spectrum: frequencies
-/// and densities.
+/// Mean, root mean square, crest factor, order of persistent excitation, the highest order tried, and the spectrum:
+/// frequencies and densities.
 type Figures<'py> = (f64, f64, Option<f64>, usize, usize, Column<'py>, Column<'py>);
 
-/// The signal that `thetahat design` makes with these options: its channels, the figures of each, its period, the frequencies of its
-/// sinusoids, and the seconds between samples.
+/// The signal that `thetahat design` makes with these options: its channels, the figures of each, its period, the
+/// frequencies of its sinusoids, and the seconds between samples.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "a tuple that the package takes apart at once")]
 pub(crate) fn design_signal<'py>(

@@ -86,8 +86,8 @@ pub(crate) fn layout() -> Layout {
     Layout { spelled: in_python, ..Layout::default() }
 }
 
-/// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0` is
-/// `sample_time 0`.
+/// A message that names options of the command line, with the keyword arguments that they are here: `--sample-time 0`
+/// is `sample_time 0`.
 ///
 /// It may repeat names and parts of files, and goes to a terminal: it is bounded, and what is invisible is an escape.
 pub(crate) fn in_python(message: &str) -> String {

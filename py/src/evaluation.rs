@@ -149,7 +149,8 @@ pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Cells<'py>> {
     cells(py, &row)
 }
 
-/// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and its table.
+/// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and
+/// its table.
 #[pyfunction]
 pub(crate) fn spectrum(
     py: Python<'_>,

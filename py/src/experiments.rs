@@ -96,8 +96,8 @@ impl Experiments {
     }
 }
 
-/// A search that asks a function of Python: it has a list of questions, one for each holder, and gives their answers. What it raises is
-/// raised.
+/// A search that asks a function of Python: it has a list of questions, one for each holder, and gives their answers.
+/// What it raises is raised.
 fn asking<T: Send + 'static>(
     py: Python<'_>,
     ask: Py<PyAny>,
@@ -182,7 +182,8 @@ pub(crate) fn answer_equations<'py>(
     Ok(PyBytes::new(py, &answer))
 }
 
-/// Fits a model in equations to logs of which others have some each, with the options of `thetahat fit --grey`, see [`asking`].
+/// Fits a model in equations to logs of which others have some each, with the options of `thetahat fit --grey`, see
+/// [`asking`].
 #[pyfunction]
 pub(crate) fn fit_equations_distributed(
     py: Python<'_>,

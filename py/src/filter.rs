@@ -164,8 +164,8 @@ fn numbers<'a>(
 #[pymethods]
 #[pyo3(crate = "crate::in_use")]
 impl StateFilter {
-    /// A filter before its first row: the word of the estimator or none; of an observer its poles, real and imaginary parts, or
-    /// its gain.
+    /// A filter before its first row: the word of the estimator or none; of an observer its poles, real and imaginary
+    /// parts, or its gain.
     #[new]
     #[pyo3(signature = (model, estimator, poles, gain))]
     fn new(
@@ -260,8 +260,8 @@ impl StateFilter {
         Ok(Some(found))
     }
 
-    /// Takes many rows: the seconds before each, NaN for one sample time; none for that of all. The first row of all is at
-    /// `start` seconds. Smoothed, also each state given all rows.
+    /// Takes many rows: the seconds before each, NaN for one sample time; none for that of all. The first row of all is
+    /// at `start` seconds. Smoothed, also each state given all rows.
     #[pyo3(signature = (seconds, inputs, outputs, start, smooth))]
     fn run<'py>(
         &mut self,

@@ -1,8 +1,9 @@
-//! PyO3 with another message where an object is in use already: `#[pyo3(crate = "crate::in_use")]` at the methods of a class that changes makes
-//! their code call what stands here, where `&self` and its like are taken. There is no lock: a call that comes while another one runs is refused,
-//! as before.
+//! PyO3 with another message where an object is in use already: `#[pyo3(crate = "crate::in_use")]` at the methods of a
+//! class that changes makes their code call what stands here, where `&self` and its like are taken. There is no lock: a
+//! call that comes while another one runs is refused, as before.
 //!
-//! What generated code calls is no stable interface of PyO3. Where it changes, this does not compile, or the tests of the message tell.
+//! What generated code calls is no stable interface of PyO3. Where it changes, this does not compile, or the tests of
+//! the message tell.
 
 pub(crate) use pyo3::*;
 
@@ -19,8 +20,8 @@ pub(crate) mod impl_ {
         use pyo3::type_object::PyTypeCheck;
         use pyo3::{Borrowed, PyClass, PyClassGuard, PyClassGuardMut};
 
-        /// What is said of an object that could not be taken: PyO3 raises a RuntimeError for one in use, and a TypeError for one of another
-        /// class.
+        /// What is said of an object that could not be taken: PyO3 raises a RuntimeError for one in use, and a
+        /// TypeError for one of another class.
         #[cold]
         fn said(object: &Bound<'_, PyAny>, error: PyErr) -> PyErr {
             if !error.is_instance_of::<PyRuntimeError>(object.py()) {

@@ -1,8 +1,9 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
-//! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half, `online` the steppers,
-//! `filter` and `track` the steppers behind logs. `journal` is what has been done with which of many logs. `array` reads and makes
-//! NumPy arrays, `error` is the one map of errors, `in_use` what is said of an object that another call uses, `work` runs what takes long.
+//! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half,
+//! `online` the steppers, `filter` and `track` the steppers behind logs. `journal` is what has been done with which of
+//! many logs. `array` reads and makes NumPy arrays, `error` is the one map of errors, `in_use` what is said of an
+//! object that another call uses, `work` runs what takes long.
 
 mod array;
 mod design;
@@ -25,8 +26,9 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 
-/// Signals are allocated for each question of a search. Freed memory is kept for a moment here; the C library gives it back at once
-/// where it is told to, as it is on a worker of Dask, and half of the time is then the system's, page by page.
+/// Signals are allocated for each question of a search. Freed memory is kept for a moment here; the C library gives it
+/// back at once where it is told to, as it is on a worker of Dask, and half of the time is then the system's, page by
+/// page.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -33,9 +33,9 @@ type Clock<'py> = (Bound<'py, PyAny>, Option<(f64, String, bool)>, Option<String
 
 #[pymethods]
 impl Log {
-    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or "linear", whether
-    /// to filter against aliasing), the first time as it was written, and what the times are called. Its steps may be uneven unless it
-    /// has to be uniform.
+    /// Channels by name with a fixed sample time, or with a clock: the times, how to resample, (step, "hold" or
+    /// "linear", whether to filter against aliasing), the first time as it was written, and what the times are called.
+    /// Its steps may be uneven unless it has to be uniform.
     #[new]
     #[pyo3(signature = (channels, inputs, outputs, sample_time, clock=None, uniform=true))]
     fn new(

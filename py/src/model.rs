@@ -167,7 +167,8 @@ impl Model {
         Ok(tables::report(&*self.report(py)?, error::layout()))
     }
 
-    /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how close it is.
+    /// What to warn of after a fit. Of least squares alone the figures wait: nothing to warn of hangs on them but how
+    /// close it is.
     fn warnings(&self, py: Python<'_>) -> PyResult<Vec<String>> {
         let known = self.pending.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let waits =
@@ -233,7 +234,8 @@ impl Model {
         Ok(applied.outputs.into_iter().map(|one| PyArray1::from_vec(py, one.predicted)).collect())
     }
 
-    /// Of each output, the free run on a log, or from rest on inputs, kept within the range of the fit; and how many values were.
+    /// Of each output, the free run on a log, or from rest on inputs, kept within the range of the fit; and how many
+    /// values were.
     #[pyo3(signature = (log, inputs, initial))]
     fn clamped_run<'py>(
         &self,
@@ -249,8 +251,8 @@ impl Model {
         Ok((columns.collect(), applied.clamped.unwrap_or(0)))
     }
 
-    /// Free runs drawn from what the estimate leaves open, on a log or on inputs, one column for each: a row for each draw. Also
-    /// how often parameters were unstable, and whether they vary.
+    /// Free runs drawn from what the estimate leaves open, on a log or on inputs, one column for each: a row for each
+    /// draw. Also how often parameters were unstable, and whether they vary.
     #[pyo3(signature = (log, inputs, draws, seed, initial))]
     fn sample<'py>(
         &self,
@@ -325,8 +327,8 @@ impl Model {
         each.collect()
     }
 
-    /// For each input and the noise: its name, frequencies, real and imaginary parts, and magnitude and phase with their
-    /// standard errors.
+    /// For each input and the noise: its name, frequencies, real and imaginary parts, and magnitude and phase with
+    /// their standard errors.
     #[pyo3(signature = (frequencies, points, output=0))]
     fn frequency_response<'py>(
         &self,

@@ -72,7 +72,8 @@ impl Tracker {
         self.tracking.state().map_err(|failure| error::program(py, &failure))
     }
 
-    /// Takes rows: inputs, outputs, their clock if they have one, and the rows before which an unknown number is missing.
+    /// Takes rows: inputs, outputs, their clock if they have one, and the rows before which an unknown number is
+    /// missing.
     #[pyo3(signature = (inputs, outputs, clock, gaps, stop_on_alarm))]
     fn run<'py>(
         &mut self,

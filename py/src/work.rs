@@ -1,7 +1,7 @@
 //! Long work without the interpreter lock: Ctrl-C ends it, and it goes on in a forked process.
 //!
-//! Whatever may use the threads of rayon goes through [`awaited`], or [`blocking`]: in a fork rayon's own pool waits for
-//! threads that only the parent has.
+//! Whatever may use the threads of rayon goes through [`awaited`], or [`blocking`]: in a fork rayon's own pool waits
+//! for threads that only the parent has.
 
 use std::any::Any;
 use std::cell::{Cell, RefCell};
@@ -43,7 +43,8 @@ struct Pools {
 }
 
 thread_local! {
-    /// How many threads the calls of this thread share with all others that want as many; 0: as many as there are cores.
+    /// How many threads the calls of this thread share with all others that want as many; 0: as many as there are
+    /// cores.
     static THREADS: Cell<usize> = const { Cell::new(0) };
     /// What ends the calls of this thread, which no signal reaches where it is not the main one.
     static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
@@ -162,8 +163,8 @@ fn known() -> MutexGuard<'static, Pools> {
     known
 }
 
-/// Has the calls of this thread share this many threads with all others that want as many, 0: as many as there are cores; and end
-/// when `stop` is asked. Gives what was before, to be given back.
+/// Has the calls of this thread share this many threads with all others that want as many, 0: as many as there are
+/// cores; and end when `stop` is asked. Gives what was before, to be given back.
 #[pyfunction]
 #[pyo3(signature = (count, stop))]
 fn threads(count: usize, stop: Option<&Bound<'_, Stop>>) -> (usize, Option<Stop>) {
@@ -241,10 +242,10 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 
 /// Calls Python code from a loop of ours.
 ///
-/// Before Python 3.14 a daemon thread that wants the interpreter lock after the interpreter has ended is torn down where
-/// it stands. With a function of this module under the Python code on its stack that aborts the process. So the
-/// interpreter waits until such calls have returned, and a thread that begins another one rests for ever, as every daemon
-/// thread does from Python 3.14 on.
+/// Before Python 3.14 a daemon thread that wants the interpreter lock after the interpreter has ended is torn down
+/// where it stands. With a function of this module under the Python code on its stack that aborts the process. So the
+/// interpreter waits until such calls have returned, and a thread that begins another one rests for ever, as every
+/// daemon thread does from Python 3.14 on.
 pub(crate) fn calling<T>(py: Python<'_>, call: impl FnOnce() -> T) -> T {
     /// Counts while it lives.
     struct Call;

@@ -105,8 +105,8 @@ fn dc_motor() -> String {
     csv
 }
 
-/// A step test of a heater: time [s], heater [%], temperature [degC]; a gain of 0.6 degC per %, a time constant of 80 s and a dead time of
-/// 12 s.
+/// A step test of a heater: time [s], heater [%], temperature [degC]; a gain of 0.6 degC per %, a time constant of 80 s
+/// and a dead time of 12 s.
 fn heater_steps() -> String {
     const GAIN: f64 = 0.6;
     const TIME_CONSTANT: f64 = 80.0;

@@ -1,10 +1,10 @@
 //! The Rust side of the comparison, driven by `compare.py`.
 //!
-//! `thetahat-peers write FOLDER` writes the signals: `u.f64` and `y.f64` (raw numbers) and `log.csv`.
-//! `thetahat-peers serve FOLDER` reads them, then answers each line `METHOD NA NB NK` on standard input with one
-//! line: the seconds that the method took, and the parameters. `grid NA NB NK` compares all models up to these orders on the
-//! first tenth of the signals, then fits the chosen one: the answer holds its orders and mean square error instead.
-//! `largest` fits the largest of them to the same samples.
+//! `thetahat-peers write FOLDER` writes the signals: `u.f64` and `y.f64` (raw numbers) and `log.csv`. `thetahat-peers
+//! serve FOLDER` reads them, then answers each line `METHOD NA NB NK` on standard input with one line: the seconds that
+//! the method took, and the parameters. `grid NA NB NK` compares all models up to these orders on the first tenth of
+//! the signals, then fits the chosen one: the answer holds its orders and mean square error instead. `largest` fits the
+//! largest of them to the same samples.
 
 #[path = "../../signals.rs"]
 mod signals;
@@ -95,8 +95,8 @@ fn gram(input: &[f64], output: &[f64], orders: &Orders) -> Result<Vec<f64>> {
     Ok(arx(&Record::new(output, vec![input])?, orders, Initial::Drop)?.parameters().to_vec())
 }
 
-/// The best of all models with 1 to `na`, 1 to `nb`, 1 to `nk`, fitted: its orders, and its mean square error on the samples
-/// that all of them have.
+/// The best of all models with 1 to `na`, 1 to `nb`, 1 to `nk`, fitted: its orders, and its mean square error on the
+/// samples that all of them have.
 fn grid(input: &[f64], output: &[f64], [na, nb, nk]: [usize; 3]) -> Result<Vec<f64>> {
     let up_to = |last| OrderRange::new(1, last);
     let grid = Grid {

@@ -1,8 +1,8 @@
 //! What has been done with which log, so that a run goes on where another one was interrupted.
 //!
-//! A file of lines in the folder of documents, one for each log that is done: the digest of the log and of all that its row
-//! depends on, that of its document, and the row. A line is written once its document is on the disk. A line that was cut, one of
-//! another digest, and one whose document is another by now, is as if it were not there.
+//! A file of lines in the folder of documents, one for each log that is done: the digest of the log and of all that its
+//! row depends on, that of its document, and the row. A line is written once its document is on the disk. A line that
+//! was cut, one of another digest, and one whose document is another by now, is as if it were not there.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -52,8 +52,8 @@ impl Line {
 }
 
 impl Journal {
-    /// That of a folder, which is made if it is not there. `common` is what all rows depend on beside their logs, in words that differ
-    /// where it does.
+    /// That of a folder, which is made if it is not there. `common` is what all rows depend on beside their logs, in
+    /// words that differ where it does.
     ///
     /// # Errors
     /// That it cannot be read or written, or that another run has it.
@@ -89,7 +89,8 @@ impl Journal {
         Ok(Self { path, file: Mutex::new(file), known, common, reused: AtomicUsize::new(0) })
     }
 
-    /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be read, or is a pipe.
+    /// The digest of a log and of all that its row depends on: 32 hexadecimal digits of XXH3. None if the log cannot be
+    /// read, or is a pipe.
     pub fn digest(&self, log: &Path) -> Option<String> {
         digest(self.common.as_bytes(), log)
     }

@@ -15,11 +15,12 @@ pub(super) struct Named {
     pub(super) report: PathBuf,
 }
 
-/// The logs that names and patterns stand for, and those that a file lists: in this order, those of a pattern in alphabetical
-/// order, each once. With `stored` their documents need names that differ.
+/// The logs that names and patterns stand for, and those that a file lists: in this order, those of a pattern in
+/// alphabetical order, each once. With `stored` their documents need names that differ.
 ///
 /// # Errors
-/// A pattern that cannot be read or matches nothing; a list that cannot be read; no log at all; two logs with one document.
+/// A pattern that cannot be read or matches nothing; a list that cannot be read; no log at all; two logs with one
+/// document.
 pub(super) fn named(patterns: &[PathBuf], list: Option<&Path>, stored: bool) -> Result<Vec<Named>, Failure> {
     let listed = match list {
         Some(path) => {
@@ -93,8 +94,8 @@ fn matching(pattern: &Path) -> Result<Vec<PathBuf>, Failure> {
     Ok(paths)
 }
 
-/// The files that a pattern stands for whose names are not UTF-8, which the library leaves out: each such letter is one that `*` and
-/// `?` stand for.
+/// The files that a pattern stands for whose names are not UTF-8, which the library leaves out: each such letter is one
+/// that `*` and `?` stand for.
 fn not_text(pattern: &str) -> Vec<PathBuf> {
     let (folder, name) = pattern.rsplit_once('/').map_or((".", pattern), |(folder, name)| (folder, name));
     let (Ok(folders), Ok(name)) =

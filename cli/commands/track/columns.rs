@@ -38,7 +38,8 @@ pub(super) struct Sample {
 }
 
 impl Columns {
-    /// Those of a log that may have a clock, with a forecast this many rows ahead if one was asked for. Several outputs are named.
+    /// Those of a log that may have a clock, with a forecast this many rows ahead if one was asked for. Several outputs
+    /// are named.
     pub(super) fn new(
         has_time: bool,
         horizon: Option<usize>,

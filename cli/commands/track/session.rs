@@ -59,8 +59,8 @@ pub(super) struct Seen<'a> {
 }
 
 impl Session<'_> {
-    /// Takes in a row, of which `place_of` says where it is; says whether there was an alarm. `seen` is told what each tracker made
-    /// of it.
+    /// Takes in a row, of which `place_of` says where it is; says whether there was an alarm. `seen` is told what each
+    /// tracker made of it.
     pub(super) fn row(
         &mut self,
         row: &Row<'_>,

@@ -171,7 +171,8 @@ impl State {
         self.setting.iter().find(|(other, _)| other == option).map(|(_, value)| value.as_str())
     }
 
-    /// Names the clock, before the first row: the column of times, and the first one as it is written if times are dates.
+    /// Names the clock, before the first row: the column of times, and the first one as it is written if times are
+    /// dates.
     pub(super) fn name_clock(&mut self, name: &str, start: Option<String>) {
         if let Some((_, value)) = self.setting.iter_mut().find(|(option, _)| option == "--time") {
             name.clone_into(value);

@@ -14,8 +14,8 @@ use crate::line_writer::{Format, LineWriter, Written};
 
 /// What `thetahat track` does with the rows of a log, fed row by row, with its state and its documents.
 ///
-/// The state counts the lines that the program writes of these rows: so it is the state of the program, which goes on from it as
-/// from its own.
+/// The state counts the lines that the program writes of these rows: so it is the state of the program, which goes on
+/// from it as from its own.
 pub struct Tracking {
     inputs: Vec<String>,
     outputs: Vec<String>,
@@ -46,7 +46,8 @@ pub struct TrackedRow<'a> {
 }
 
 impl Tracking {
-    /// That of a log with these channels, with the options of `thetahat track`; with a report, `--warm` must be among them.
+    /// That of a log with these channels, with the options of `thetahat track`; with a report, `--warm` must be among
+    /// them.
     pub(crate) fn new(
         arguments: &TrackArguments,
         inputs: Vec<String>,
@@ -82,8 +83,8 @@ impl Tracking {
     /// Goes on from the state that `thetahat track --state` has written, or [`Tracking::state`].
     ///
     /// # Errors
-    /// A [`Failure`] if the text is no such state, or was edited; if the names of inputs hold commas, which do not tell where one
-    /// ends, and `inputs` does not say them.
+    /// A [`Failure`] if the text is no such state, or was edited; if the names of inputs hold commas, which do not tell
+    /// where one ends, and `inputs` does not say them.
     pub fn from_state(text: &str, inputs: Option<Vec<String>>) -> Result<Self, Failure> {
         let state = State::parse(text.as_bytes()).map_err(Failure::data)?;
         let damaged = || Failure::data("its parts do not fit together; give a state that was not edited");
@@ -136,12 +137,12 @@ impl Tracking {
         Ok(Self::of(inputs, outputs, every, horizon, columns, state, lines))
     }
 
-    /// Takes rows as long as there are some: `next` gives their values, the inputs and then the outputs, their time, and
-    /// whether an unknown number of rows is missing before them; `seen` is told what each tracker made of each row. After a
-    /// failure nothing has changed.
+    /// Takes rows as long as there are some: `next` gives their values, the inputs and then the outputs, their time,
+    /// and whether an unknown number of rows is missing before them; `seen` is told what each tracker made of each row.
+    /// After a failure nothing has changed.
     ///
-    /// `clock` is what the first rows of all say of theirs: the column of times, which is empty without one, and the first time as
-    /// it is written if times are dates.
+    /// `clock` is what the first rows of all say of theirs: the column of times, which is empty without one, and the
+    /// first time as it is written if times are dates.
     ///
     /// # Errors
     /// What `next` says; a [`Failure`] if a value is infinite.

@@ -172,8 +172,8 @@ enum thetahat_outliers
     THETAHAT_OUTLIERS_USED = 0,
     // They correct as one of `threshold` standard deviations does: 3 loses nothing where there are none.
     THETAHAT_OUTLIERS_HUBER = 1,
-    // Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them in a
-    // row the next ones do.
+    // Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them
+    // in a row the next ones do.
     THETAHAT_OUTLIERS_GATE = 2,
 };
 #ifndef __cplusplus
@@ -361,20 +361,21 @@ typedef struct thetahat_rls_size thetahat_rls_size;
 // A linear controller R(q) u(k) = T(q) uc(k) - S(q) y(k) with limits and without windup, T = t0 Ao.
 typedef struct thetahat_rst thetahat_rst;
 
-// Pole placement for a number of coefficients: `thetahat_rst_place_2` for 2. It stands apart so that a controller with fixed
-// coefficients does not link it.
+// Pole placement for a number of coefficients: `thetahat_rst_place_2` for 2. It stands apart so that a controller with
+// fixed coefficients does not link it.
 typedef struct thetahat_rst_place_size thetahat_rst_place_size;
 
 // The number of coefficients of a `thetahat_rst`: `thetahat_rst_2` for 2.
 typedef struct thetahat_rst_size thetahat_rst_size;
 
-// A controller that learns its plant while it runs: a model that it is designed for anew (indirect), or its own coefficients
-// (direct).
+// A controller that learns its plant while it runs: a model that it is designed for anew (indirect), or its own
+// coefficients (direct).
 typedef struct thetahat_tuner thetahat_tuner;
 
-// The way and the orders of a `thetahat_tuner`. `thetahat_indirect_2_3`: a plant with na = 2 and nb = 3 coefficients of B(q), one
-// more than its order for each sample of dead time; the controller integrates. `thetahat_direct_2_2_1`: na = 2, nb = 2, and an
-// input that acts after 1 sample; for plants whose inverse is stable and whose delay is known. Both have a constant for loads.
+// The way and the orders of a `thetahat_tuner`. `thetahat_indirect_2_3`: a plant with na = 2 and nb = 3 coefficients
+// of B(q), one more than its order for each sample of dead time; the controller integrates. `thetahat_direct_2_2_1`:
+// na = 2, nb = 2, and an input that acts after 1 sample; for plants whose inverse is stable and whose delay is known.
+// Both have a constant for loads.
 typedef struct thetahat_tuner_size thetahat_tuner_size;
 
 // A word of the memory that an object is given: so it is aligned for whatever stands in it.
@@ -389,14 +390,14 @@ typedef struct {
 } thetahat_input_orders;
 
 #if !defined(THETAHAT_DOUBLE)
-// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library, whose
-// feature `double` makes it `double`.
+// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library,
+// whose feature `double` makes it `double`.
 typedef float thetahat_number;
 #endif
 
 #if defined(THETAHAT_DOUBLE)
-// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library, whose
-// feature `double` makes it `double`.
+// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library,
+// whose feature `double` makes it `double`.
 typedef double thetahat_number;
 #endif
 
@@ -456,7 +457,8 @@ typedef struct {
 
 // The innovation of a sample: the part of the measurement that was not predicted.
 typedef struct {
-    // The measurement less its prediction, element by element, in the unit of the measurement. NaN where it is missing.
+    // The measurement less its prediction, element by element, in the unit of the measurement. NaN where it is
+    // missing.
     thetahat_number error[THETAHAT_MOST_OUTPUTS];
     // The variance of each, given those after it in the same measurement. NaN where it is missing or not known.
     thetahat_number variance[THETAHAT_MOST_OUTPUTS];
@@ -479,12 +481,12 @@ typedef struct {
     thetahat_number statistic;
 } thetahat_alarm;
 
-// A function of the state: `value` from `state`; `context` is that of the function. Arrays do not overlap. Values are 0 before
-// the call, so that only the others need be written.
+// A function of the state: `value` from `state`; `context` is that of the function. Arrays do not overlap. Values are
+// 0 before the call, so that only the others need be written.
 typedef void (*thetahat_function_of_state)(const thetahat_number *state, thetahat_number *value, void *context);
 
-// A function of the state and its Jacobian: f or h of a model. Inputs and time are in the context. A function that writes NaN or
-// infinity makes the filter return an error and stay as it was.
+// A function of the state and its Jacobian: f or h of a model. Inputs and time are in the context. A function that
+// writes NaN or infinity makes the filter return an error and stay as it was.
 typedef struct {
     // f(x), n numbers, or h(x), m numbers.
     thetahat_function_of_state value;
@@ -524,7 +526,8 @@ typedef struct {
 
 // What a self-tuner is asked for. `thetahat_tuner_usual` fills it in.
 typedef struct {
-    // The natural frequency of the response to the set point, in rad a sample: about 4/(damping n) to settle within n samples.
+    // The natural frequency of the response to the set point, in rad a sample: about 4/(damping n) to settle within n
+    // samples.
     thetahat_number frequency;
     // Its damping, above 0 and at most 1.
     thetahat_number damping;
@@ -839,8 +842,8 @@ size_t thetahat_number_bytes(void);
 // - model: the orders, which make n parameters, and the scales.
 // - learning: how old samples are forgotten and how it starts; NULL for the default.
 //
-// Errors: MEMORY_TOO_SMALL; ORDERS if the orders do not make n parameters; DELAYS; LENGTH for too many inputs; NOT_FINITE;
-// OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is out of its range.
+// Errors: MEMORY_TOO_SMALL; ORDERS if the orders do not make n parameters; DELAYS; LENGTH for too many inputs;
+// NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is out of its range.
 thetahat_error thetahat_arx_init(thetahat_arx **arx,
                                  thetahat_word *memory,
                                  size_t bytes,
@@ -848,13 +851,13 @@ thetahat_error thetahat_arx_init(thetahat_arx **arx,
                                  const thetahat_arx_model *model,
                                  const thetahat_learning *learning);
 
-// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were applied before. NaN is a missing
-// sample. The innovation may be NULL.
+// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were applied before. NaN is a
+// missing sample. The innovation may be NULL.
 //
 // A controller calls measured, then computes u(k), then calls applied. A call that is left out is a missing sample.
 //
-// Errors, after which time has not gone on: INPUT_FIRST if an nk is 0; INFINITE; TOO_LARGE. 1.5 n^2 + 7 n multiply-adds, with
-// ARMAX nc n more.
+// Errors, after which time has not gone on: INPUT_FIRST if an nk is 0; INFINITE; TOO_LARGE. 1.5 n^2 + 7 n
+// multiply-adds, with ARMAX nc n more.
 thetahat_error thetahat_arx_measured(thetahat_arx *arx,
                                      thetahat_number output,
                                      thetahat_innovation *innovation);
@@ -868,7 +871,8 @@ thetahat_error thetahat_arx_applied(thetahat_arx *arx,
                                     const thetahat_number *inputs,
                                     size_t count);
 
-// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample. The innovation may be NULL.
+// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample. The innovation may be
+// NULL.
 //
 // Not the call for a controller that knows u(k-1) when y(k) arrives: that calls measured and applied.
 //
@@ -881,12 +885,12 @@ thetahat_error thetahat_arx_log_row(thetahat_arx *arx,
 
 // The outputs to come, y(k+1), y(k+2), ... after the latest one, y(k).
 //
-// - inputs, count: those to come, instant by instant, one number for each input of the model: steps times the inputs. After
-//   measured the first is u(k); after applied or log_row it is u(k+1).
+// - inputs, count: those to come, instant by instant, one number for each input of the model: steps times the inputs.
+//   After measured the first is u(k); after applied or log_row it is u(k+1).
 // - outputs, steps: where they go, and how many. One that depends on a missing sample is NaN.
 //
-// Errors: LENGTH; INFINITE; OVERFLOW if an unstable model grows out of the number type: outputs before that are written,
-// the others are NaN.
+// Errors: LENGTH; INFINITE; OVERFLOW if an unstable model grows out of the number type: outputs before that are
+// written, the others are NaN.
 thetahat_error thetahat_arx_predict(const thetahat_arx *arx,
                                     const thetahat_number *inputs,
                                     size_t count,
@@ -911,33 +915,33 @@ thetahat_error thetahat_arx_covariance(const thetahat_arx *arx, thetahat_number 
 // Errors: NOT_FINITE; TOO_LARGE; OUT_OF_RANGE if C(q) is not stable.
 thetahat_error thetahat_arx_set_parameters(thetahat_arx *arx, const thetahat_number *parameters);
 
-// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard one. The
-// samples that were seen stay.
+// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard
+// one. The samples that were seen stay.
 //
 // - parameters: n numbers, in the order of `thetahat_arx_model`.
-// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the upper
-//   triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and the same. In
-//   single precision a factor is always that of a covariance, where a rounded P may be none.
+// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the
+//   upper triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and
+//   the same. In single precision a factor is always that of a covariance, where a rounded P may be none.
 // - noise_variance: the variance of e, at least 0, in the unit of y squared.
 // - samples: how many the fit had, more than n.
 //
-// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number below the
-// diagonal is not 0, or the noise variance or the samples are out of range.
+// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number
+// below the diagonal is not 0, or the noise variance or the samples are out of range.
 thetahat_error thetahat_arx_set_fit(thetahat_arx *arx,
                                     const thetahat_number *parameters,
                                     const thetahat_number *factor,
                                     thetahat_number noise_variance,
                                     size_t samples);
 
-// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
-// 2.5 n^3 multiply-adds.
+// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance
+// stay. 2.5 n^3 multiply-adds.
 //
 // Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
 thetahat_error thetahat_arx_set_covariance(thetahat_arx *arx,
                                            const thetahat_number *covariance);
 
-// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
-// that has changed, as after a repair.
+// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a
+// plant that has changed, as after a repair.
 //
 // Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
 thetahat_error thetahat_arx_widen(thetahat_arx *arx,
@@ -950,8 +954,8 @@ thetahat_error thetahat_arx_set_adaptation(thetahat_arx *arx, uint32_t on);
 //
 // - detector: where its handle goes. It points into the memory.
 // - memory, bytes: at least `THETAHAT_DETECTOR_WORDS` words, and their size in bytes.
-// - mean_threshold, variance_threshold: above 0. A chart with the threshold h gives at most one false alarm in exp(h) samples
-//   on average; INFINITY turns it off.
+// - mean_threshold, variance_threshold: above 0. A chart with the threshold h gives at most one false alarm in exp(h)
+//   samples on average; INFINITY turns it off.
 //
 // Errors: MEMORY_TOO_SMALL; OUT_OF_RANGE.
 thetahat_error thetahat_detector_init(thetahat_detector **detector,
@@ -960,8 +964,8 @@ thetahat_error thetahat_detector_init(thetahat_detector **detector,
                                       thetahat_number mean_threshold,
                                       thetahat_number variance_threshold);
 
-// Takes the innovation of a sample, of an estimator or filter. One that is missing, or whose variance is not known, changes
-// nothing. Of several outputs the normalised square is watched, by the chart of the variance alone.
+// Takes the innovation of a sample, of an estimator or filter. One that is missing, or whose variance is not known,
+// changes nothing. Of several outputs the normalised square is watched, by the chart of the variance alone.
 //
 // - alarm: what the charts say. Its chart is NONE if they say nothing.
 //
@@ -989,8 +993,8 @@ thetahat_error thetahat_ekf_init(thetahat_ekf **ekf,
                                  const thetahat_number *state,
                                  const thetahat_number *covariance);
 
-// Sets Q, n x n, and R, m x m; NULL for 0. Set them again where they depend on the state or vary in time. About n^3 + m^3
-// multiply-adds.
+// Sets Q, n x n, and R, m x m; NULL for 0. Set them again where they depend on the state or vary in time. About n^3 +
+// m^3 multiply-adds.
 //
 // Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 thetahat_error thetahat_ekf_set_noise(thetahat_ekf *ekf,
@@ -1002,14 +1006,14 @@ thetahat_error thetahat_ekf_set_noise(thetahat_ekf *ekf,
 // Errors: NOT_FINITE.
 thetahat_error thetahat_ekf_set_state(thetahat_ekf *ekf, const thetahat_number *state);
 
-// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3
+// multiply-adds.
 //
 // Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
-thetahat_error thetahat_ekf_set_covariance(thetahat_ekf *ekf,
-                                           const thetahat_number *covariance);
+thetahat_error thetahat_ekf_set_covariance(thetahat_ekf *ekf, const thetahat_number *covariance);
 
-// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
-// says, as after a fault.
+// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure
+// than P says, as after a fault.
 //
 // Errors: OUT_OF_RANGE; OVERFLOW.
 thetahat_error thetahat_ekf_widen(thetahat_ekf *ekf,
@@ -1025,16 +1029,16 @@ thetahat_error thetahat_ekf_set_gate(thetahat_ekf *ekf, thetahat_number gate, ui
 // Errors: OUT_OF_RANGE.
 thetahat_error thetahat_ekf_set_iterations(thetahat_ekf *ekf, uint32_t count);
 
-// The time update: one sample ahead. The functions of the transition must not call with this filter: that answers BUSY. About
-// 1.5 n^3 multiply-adds, where the quick way would lose digits n^3 more.
+// The time update: one sample ahead. The functions of the transition must not call with this filter: that answers
+// BUSY. About 1.5 n^3 multiply-adds, where the quick way would lose digits n^3 more.
 //
 // Errors: NOT_FINITE if the next state or the Jacobian is NaN or infinite; OVERFLOW.
 thetahat_error thetahat_ekf_predict(thetahat_ekf *ekf,
                                     const thetahat_function *transition);
 
-// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used. The
-// functions of the observation must not call with this filter: that answers BUSY. For each linearisation about
-// m (1.5 n^2 + 6 n) multiply-adds.
+// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used.
+// The functions of the observation must not call with this filter: that answers BUSY. For each linearisation about m
+// (1.5 n^2 + 6 n) multiply-adds.
 //
 // - observation: h, and its Jacobian.
 // - measurement: y(k), m numbers.
@@ -1049,9 +1053,9 @@ thetahat_error thetahat_ekf_correct(thetahat_ekf *ekf,
 // Reads the state, n numbers.
 thetahat_error thetahat_ekf_state(const thetahat_ekf *ekf, thetahat_number *state);
 
-// Reads P, the covariance of the error of the state as far as the linearised model knows it, n x n. n^3/6 multiply-adds.
-thetahat_error thetahat_ekf_covariance(const thetahat_ekf *ekf,
-                                       thetahat_number *covariance);
+// Reads P, the covariance of the error of the state as far as the linearised model knows it, n x n. n^3/6
+// multiply-adds.
+thetahat_error thetahat_ekf_covariance(const thetahat_ekf *ekf, thetahat_number *covariance);
 
 // The name of an error: `NOT_FINITE` for `THETAHAT_ERROR_NOT_FINITE`; `UNKNOWN` for what is none. It lives for ever.
 const char *thetahat_error_name(int32_t code);
@@ -1062,7 +1066,8 @@ const char *thetahat_error_text(int32_t code);
 // An action in a word or two, such as `not ready`; `other` for what is none. It lives for ever.
 const char *thetahat_action_word(int32_t action);
 
-// Makes a filter that starts from this state and the covariance of its error. Set the transition and the observation next.
+// Makes a filter that starts from this state and the covariance of its error. Set the transition and the observation
+// next.
 //
 // - kalman: where its handle goes. It points into the memory.
 // - memory, bytes: at least `THETAHAT_KALMAN_WORDS(n, m)` words, and their size in bytes.
@@ -1084,8 +1089,8 @@ thetahat_error thetahat_kalman_init(thetahat_kalman **kalman,
 // - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 // - noise: Q, n x n; NULL for 0.
 //
-// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE;
-// NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
+// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0;
+// NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
 thetahat_error thetahat_kalman_set_transition(thetahat_kalman *kalman,
                                               const thetahat_number *state_matrix,
                                               const thetahat_number *input_matrix,
@@ -1095,10 +1100,12 @@ thetahat_error thetahat_kalman_set_transition(thetahat_kalman *kalman,
 // Sets what is measured: y = H x + D u + v, v ~ (0, R). It may be set again at any time.
 //
 // - output_matrix: H, m x n.
-// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
+// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there
+//   are none.
 // - noise: R, m x m; NULL for 0.
 //
-// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC;
+// NOT_POSITIVE.
 thetahat_error thetahat_kalman_set_observation(thetahat_kalman *kalman,
                                                const thetahat_number *output_matrix,
                                                const thetahat_number *input_matrix,
@@ -1109,21 +1116,22 @@ thetahat_error thetahat_kalman_set_observation(thetahat_kalman *kalman,
 // Errors: NOT_FINITE.
 thetahat_error thetahat_kalman_set_state(thetahat_kalman *kalman, const thetahat_number *state);
 
-// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3
+// multiply-adds.
 //
 // Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
-thetahat_error thetahat_kalman_set_covariance(thetahat_kalman *kalman,
-                                              const thetahat_number *covariance);
+thetahat_error thetahat_kalman_set_covariance(thetahat_kalman *kalman, const thetahat_number *covariance);
 
-// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
-// says, as after a fault.
+// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure
+// than P says, as after a fault.
 //
 // Errors: OUT_OF_RANGE; OVERFLOW.
 thetahat_error thetahat_kalman_widen(thetahat_kalman *kalman,
                                      thetahat_number factor);
 
-// Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at first.
-// After `release` such measurements in a row, 1 ... 65535, those that follow are used all the same; 0 for never.
+// Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at
+// first. After `release` such measurements in a row, 1 ... 65535, those that follow are used all the same; 0 for
+// never.
 //
 // Errors: OUT_OF_RANGE.
 thetahat_error thetahat_kalman_set_gate(thetahat_kalman *kalman,
@@ -1137,8 +1145,8 @@ thetahat_error thetahat_kalman_set_gate(thetahat_kalman *kalman,
 thetahat_error thetahat_kalman_predict(thetahat_kalman *kalman,
                                        const thetahat_number *input);
 
-// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used. About
-// m (1.5 n^2 + 6 n) multiply-adds.
+// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used.
+// About m (1.5 n^2 + 6 n) multiply-adds.
 //
 // - input: u(k), the inputs of the transition; NULL where there are none.
 // - measurement: y(k), m numbers.
@@ -1177,7 +1185,8 @@ thetahat_error thetahat_luenberger_init(thetahat_luenberger **luenberger,
 // - state_matrix: F, n x n, row by row, as all matrices.
 // - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 //
-// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE.
+// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0;
+// NOT_FINITE.
 thetahat_error thetahat_luenberger_set_transition(thetahat_luenberger *luenberger,
                                                   const thetahat_number *state_matrix,
                                                   const thetahat_number *input_matrix,
@@ -1186,14 +1195,16 @@ thetahat_error thetahat_luenberger_set_transition(thetahat_luenberger *luenberge
 // Sets what is measured: y = H x + D u. It may be set again at any time.
 //
 // - output_matrix: H, m x n.
-// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
+// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there
+//   are none.
 //
 // Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE.
 thetahat_error thetahat_luenberger_set_observation(thetahat_luenberger *luenberger,
                                                    const thetahat_number *output_matrix,
                                                    const thetahat_number *input_matrix);
 
-// Sets the gain so that F - L H has these poles. Complex poles come in conjugate pairs, side by side. 4 n^3 multiply-adds.
+// Sets the gain so that F - L H has these poles. Complex poles come in conjugate pairs, side by side. 4 n^3
+// multiply-adds.
 //
 // - real, imaginary: the parts of the poles, n numbers each; all inside the unit circle.
 // - weights: m numbers by which the outputs are combined into one; NULL for 1 each.
@@ -1236,8 +1247,8 @@ thetahat_error thetahat_luenberger_gain(const thetahat_luenberger *luenberger, t
 // - scales: n typical magnitudes of the regressors. They set the prior, P_jj = 100/scale_j^2.
 // - learning: how old samples are forgotten and how it starts; NULL for the default.
 //
-// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is
-// out of its range.
+// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the
+// policy is out of its range.
 thetahat_error thetahat_rls_init(thetahat_rls **rls,
                                  thetahat_word *memory,
                                  size_t bytes,
@@ -1283,15 +1294,15 @@ thetahat_error thetahat_rls_covariance(const thetahat_rls *rls, thetahat_number 
 // Errors: NOT_FINITE; TOO_LARGE.
 thetahat_error thetahat_rls_set_parameters(thetahat_rls *rls, const thetahat_number *parameters);
 
-// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
-// 2.5 n^3 multiply-adds.
+// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance
+// stay. 2.5 n^3 multiply-adds.
 //
 // Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
 thetahat_error thetahat_rls_set_covariance(thetahat_rls *rls,
                                            const thetahat_number *covariance);
 
-// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
-// that has changed, as after a repair.
+// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a
+// plant that has changed, as after a repair.
 //
 // Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
 thetahat_error thetahat_rls_widen(thetahat_rls *rls,
@@ -1325,8 +1336,8 @@ thetahat_error thetahat_rst_start(thetahat_rst *rst,
                                   thetahat_number measurement,
                                   thetahat_number set_point);
 
-// One sample: the input from now on, within the limits. With a measurement that is NaN or infinite it stays as it was. 4 n
-// multiply-adds.
+// One sample: the input from now on, within the limits. With a measurement that is NaN or infinite it stays as it was.
+// 4 n multiply-adds.
 //
 // Errors: NULL_POINTER.
 thetahat_error thetahat_rst_control(thetahat_rst *rst,
@@ -1340,16 +1351,16 @@ thetahat_error thetahat_rst_applied(thetahat_rst *rst, thetahat_number input);
 // Computes the controller of lowest order that places the poles of the closed loop with a model A(q) y = B(q) u, for
 // `thetahat_rst_init`. About 10 n^3 flops.
 //
-// - size: `&thetahat_rst_place_n`, with n = na + nb - 1, one more with an integrator, where na and nb are the highest powers of
-//   1/q in A and B.
+// - size: `&thetahat_rst_place_n`, with n = na + nb - 1, one more with an integrator, where na and nb are the highest
+//   powers of 1/q in A and B.
 // - a, a_count: A, na + 1 coefficients that begin with 1.
 // - b, b_count: B, nb + 1 coefficients that begin with 0, and with more zeros for a longer delay.
 // - poles: where the poles shall be.
 // - law: where the controller goes.
 //
-// Errors, after which nothing is written: NOT_FINITE; OUT_OF_RANGE if a polynomial does not begin as it must, B(1) is 0, a zero
-// that shall be cancelled is not inside the unit circle, or A and B have a common factor, nearly; ORDERS if n is another;
-// LENGTH if Am Ao has more than n coefficients after its 1; TOO_LARGE; OVERFLOW.
+// Errors, after which nothing is written: NOT_FINITE; OUT_OF_RANGE if a polynomial does not begin as it must, B(1) is
+// 0, a zero that shall be cancelled is not inside the unit circle, or A and B have a common factor, nearly; ORDERS if
+// n is another; LENGTH if Am Ao has more than n coefficients after its 1; TOO_LARGE; OVERFLOW.
 thetahat_error thetahat_rst_place(const thetahat_rst_place_size *size,
                                   const thetahat_number *a,
                                   size_t a_count,
@@ -1374,8 +1385,8 @@ thetahat_error thetahat_tuner_usual(thetahat_tuner_wish *wish,
 // Makes a tuner that knows nothing yet.
 //
 // - tuner: where its handle goes. It points into the memory.
-// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and their size in
-//   bytes.
+// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and
+//   their size in bytes.
 // - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
 // - wish: what is asked for.
 // - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. The random
@@ -1389,9 +1400,9 @@ thetahat_error thetahat_tuner_init(thetahat_tuner **tuner,
                                    const thetahat_tuner_wish *wish,
                                    const thetahat_learning *learning);
 
-// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement that is NaN
-// is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design of about 10 n^3 + 560 n
-// flops, n = na + nb.
+// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement
+// that is NaN is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design
+// of about 10 n^3 + 560 n flops, n = na + nb.
 //
 // Errors: NULL_POINTER.
 thetahat_error thetahat_tuner_control(thetahat_tuner *tuner,
@@ -1402,8 +1413,8 @@ thetahat_error thetahat_tuner_control(thetahat_tuner *tuner,
 // Tells that the actuator did something else than the latest control asked for.
 thetahat_error thetahat_tuner_applied(thetahat_tuner *tuner, thetahat_number input);
 
-// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest amplitude of
-// probing, with either sign.
+// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest
+// amplitude of probing, with either sign.
 //
 // Errors: OUT_OF_RANGE.
 thetahat_error thetahat_tuner_probe(thetahat_tuner *tuner,
@@ -1416,11 +1427,9 @@ thetahat_error thetahat_tuner_set_adaptation(thetahat_tuner *tuner, uint32_t on)
 // Reads what it did in the latest sample, and what it has learnt. Each of the places may be NULL.
 //
 // - state: a `thetahat_tuner_state`.
-// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the coefficients of R, nb +
-//   delay - 1, those of S, na, and the constant.
-thetahat_error thetahat_tuner_read(const thetahat_tuner *tuner,
-                                   int32_t *state,
-                                   thetahat_number *parameters);
+// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the
+//   coefficients of R, nb + delay - 1, those of S, na, and the constant.
+thetahat_error thetahat_tuner_read(const thetahat_tuner *tuner, int32_t *state, thetahat_number *parameters);
 
 // Reads whether it is trusted. Each of the places may be NULL.
 //

@@ -243,8 +243,8 @@ fn init_armax<const N: usize>(place: Place<Arx>, model: &ArxModel, learning: &Le
 /// - model: the orders, which make n parameters, and the scales.
 /// - learning: how old samples are forgotten and how it starts; NULL for the default.
 ///
-/// Errors: MEMORY_TOO_SMALL; ORDERS if the orders do not make n parameters; DELAYS; LENGTH for too many inputs; NOT_FINITE;
-/// OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is out of its range.
+/// Errors: MEMORY_TOO_SMALL; ORDERS if the orders do not make n parameters; DELAYS; LENGTH for too many inputs;
+/// NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is out of its range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_arx_init(
     arx: *mut *mut Arx,
@@ -264,13 +264,13 @@ pub unsafe extern "C" fn thetahat_arx_init(
     })
 }
 
-/// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were applied before. NaN is a missing
-/// sample. The innovation may be NULL.
+/// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were applied before. NaN is a
+/// missing sample. The innovation may be NULL.
 ///
 /// A controller calls measured, then computes u(k), then calls applied. A call that is left out is a missing sample.
 ///
-/// Errors, after which time has not gone on: INPUT_FIRST if an nk is 0; INFINITE; TOO_LARGE. 1.5 n^2 + 7 n multiply-adds, with
-/// ARMAX nc n more.
+/// Errors, after which time has not gone on: INPUT_FIRST if an nk is 0; INFINITE; TOO_LARGE. 1.5 n^2 + 7 n
+/// multiply-adds, with ARMAX nc n more.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_arx_measured(
     arx: *mut Arx,
@@ -297,7 +297,8 @@ pub unsafe extern "C" fn thetahat_arx_applied(arx: *mut Arx, inputs: *const Numb
     })
 }
 
-/// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample. The innovation may be NULL.
+/// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample. The innovation may be
+/// NULL.
 ///
 /// Not the call for a controller that knows u(k-1) when y(k) arrives: that calls measured and applied.
 ///
@@ -320,12 +321,12 @@ pub unsafe extern "C" fn thetahat_arx_log_row(
 
 /// The outputs to come, y(k+1), y(k+2), ... after the latest one, y(k).
 ///
-/// - inputs, count: those to come, instant by instant, one number for each input of the model: steps times the inputs. After
-///   measured the first is u(k); after applied or log_row it is u(k+1).
+/// - inputs, count: those to come, instant by instant, one number for each input of the model: steps times the inputs.
+///   After measured the first is u(k); after applied or log_row it is u(k+1).
 /// - outputs, steps: where they go, and how many. One that depends on a missing sample is NaN.
 ///
-/// Errors: LENGTH; INFINITE; OVERFLOW if an unstable model grows out of the number type: outputs before that are written,
-/// the others are NaN.
+/// Errors: LENGTH; INFINITE; OVERFLOW if an unstable model grows out of the number type: outputs before that are
+/// written, the others are NaN.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_arx_predict(
     arx: *const Arx,
@@ -375,18 +376,18 @@ pub unsafe extern "C" fn thetahat_arx_set_parameters(arx: *mut Arx, parameters: 
     })
 }
 
-/// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard one. The
-/// samples that were seen stay.
+/// Sets all that a batch fit knows: its parameters, how sure they are, and the noise. The start is then the standard
+/// one. The samples that were seen stay.
 ///
 /// - parameters: n numbers, in the order of `thetahat_arx_model`.
-/// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the upper
-///   triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and the same. In
-///   single precision a factor is always that of a covariance, where a rounded P may be none.
+/// - factor: P, the covariance of the parameters over the noise variance, n x n, as P = U D U': D on the diagonal, the
+///   upper triangular U above it, without the ones of its diagonal, and 0 below. If P is diagonal so is the factor, and
+///   the same. In single precision a factor is always that of a covariance, where a rounded P may be none.
 /// - noise_variance: the variance of e, at least 0, in the unit of y squared.
 /// - samples: how many the fit had, more than n.
 ///
-/// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number below the
-/// diagonal is not 0, or the noise variance or the samples are out of range.
+/// Errors: NOT_FINITE; TOO_LARGE; NEGATIVE if a number of D is; OVERFLOW; OUT_OF_RANGE if C(q) is not stable, a number
+/// below the diagonal is not 0, or the noise variance or the samples are out of range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_arx_set_fit(
     arx: *mut Arx,
@@ -403,8 +404,8 @@ pub unsafe extern "C" fn thetahat_arx_set_fit(
     })
 }
 
-/// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
-/// 2.5 n^3 multiply-adds.
+/// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance
+/// stay. 2.5 n^3 multiply-adds.
 ///
 /// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
 #[unsafe(no_mangle)]
@@ -416,8 +417,8 @@ pub unsafe extern "C" fn thetahat_arx_set_covariance(arx: *mut Arx, covariance: 
     })
 }
 
-/// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
-/// that has changed, as after a repair.
+/// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a
+/// plant that has changed, as after a repair.
 ///
 /// Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
 #[unsafe(no_mangle)]

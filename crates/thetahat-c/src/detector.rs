@@ -59,8 +59,8 @@ impl Kind for Detector {
 ///
 /// - detector: where its handle goes. It points into the memory.
 /// - memory, bytes: at least `THETAHAT_DETECTOR_WORDS` words, and their size in bytes.
-/// - mean_threshold, variance_threshold: above 0. A chart with the threshold h gives at most one false alarm in exp(h) samples
-///   on average; INFINITY turns it off.
+/// - mean_threshold, variance_threshold: above 0. A chart with the threshold h gives at most one false alarm in exp(h)
+///   samples on average; INFINITY turns it off.
 ///
 /// Errors: MEMORY_TOO_SMALL; OUT_OF_RANGE.
 #[unsafe(no_mangle)]
@@ -79,8 +79,8 @@ pub unsafe extern "C" fn thetahat_detector_init(
     })
 }
 
-/// Takes the innovation of a sample, of an estimator or filter. One that is missing, or whose variance is not known, changes
-/// nothing. Of several outputs the normalised square is watched, by the chart of the variance alone.
+/// Takes the innovation of a sample, of an estimator or filter. One that is missing, or whose variance is not known,
+/// changes nothing. Of several outputs the normalised square is watched, by the chart of the variance alone.
 ///
 /// - alarm: what the charts say. Its chart is NONE if they say nothing.
 ///

@@ -39,13 +39,13 @@ impl Kind for Ekf {
     }
 }
 
-/// A function of the state: `value` from `state`; `context` is that of the function. Arrays do not overlap. Values are 0 before
-/// the call, so that only the others need be written.
+/// A function of the state: `value` from `state`; `context` is that of the function. Arrays do not overlap. Values are
+/// 0 before the call, so that only the others need be written.
 pub type FunctionOfState =
     Option<unsafe extern "C" fn(state: *const Number, value: *mut Number, context: *mut c_void)>;
 
-/// A function of the state and its Jacobian: f or h of a model. Inputs and time are in the context. A function that writes NaN or
-/// infinity makes the filter return an error and stay as it was.
+/// A function of the state and its Jacobian: f or h of a model. Inputs and time are in the context. A function that
+/// writes NaN or infinity makes the filter return an error and stay as it was.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Function {
@@ -247,8 +247,8 @@ pub unsafe extern "C" fn thetahat_ekf_init(
     })
 }
 
-/// Sets Q, n x n, and R, m x m; NULL for 0. Set them again where they depend on the state or vary in time. About n^3 + m^3
-/// multiply-adds.
+/// Sets Q, n x n, and R, m x m; NULL for 0. Set them again where they depend on the state or vary in time. About n^3 +
+/// m^3 multiply-adds.
 ///
 /// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 #[unsafe(no_mangle)]
@@ -276,7 +276,8 @@ pub unsafe extern "C" fn thetahat_ekf_set_state(ekf: *mut Ekf, state: *const Num
     })
 }
 
-/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3
+/// multiply-adds.
 ///
 /// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 #[unsafe(no_mangle)]
@@ -288,8 +289,8 @@ pub unsafe extern "C" fn thetahat_ekf_set_covariance(ekf: *mut Ekf, covariance: 
     })
 }
 
-/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
-/// says, as after a fault.
+/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure
+/// than P says, as after a fault.
 ///
 /// Errors: OUT_OF_RANGE; OVERFLOW.
 #[unsafe(no_mangle)]
@@ -316,8 +317,8 @@ pub unsafe extern "C" fn thetahat_ekf_set_iterations(ekf: *mut Ekf, count: u32) 
     code(|| memory::open(ekf)?.set_iterations(count as usize))
 }
 
-/// The time update: one sample ahead. The functions of the transition must not call with this filter: that answers BUSY. About
-/// 1.5 n^3 multiply-adds, where the quick way would lose digits n^3 more.
+/// The time update: one sample ahead. The functions of the transition must not call with this filter: that answers
+/// BUSY. About 1.5 n^3 multiply-adds, where the quick way would lose digits n^3 more.
 ///
 /// Errors: NOT_FINITE if the next state or the Jacobian is NaN or infinite; OVERFLOW.
 #[unsafe(no_mangle)]
@@ -328,9 +329,9 @@ pub unsafe extern "C" fn thetahat_ekf_predict(ekf: *mut Ekf, transition: *const 
     })
 }
 
-/// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used. The
-/// functions of the observation must not call with this filter: that answers BUSY. For each linearisation about
-/// m (1.5 n^2 + 6 n) multiply-adds.
+/// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used.
+/// The functions of the observation must not call with this filter: that answers BUSY. For each linearisation about m
+/// (1.5 n^2 + 6 n) multiply-adds.
 ///
 /// - observation: h, and its Jacobian.
 /// - measurement: y(k), m numbers.
@@ -366,7 +367,8 @@ pub unsafe extern "C" fn thetahat_ekf_state(ekf: *const Ekf, state: *mut Number)
     })
 }
 
-/// Reads P, the covariance of the error of the state as far as the linearised model knows it, n x n. n^3/6 multiply-adds.
+/// Reads P, the covariance of the error of the state as far as the linearised model knows it, n x n. n^3/6
+/// multiply-adds.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_ekf_covariance(ekf: *const Ekf, covariance: *mut Number) -> Error {
     code(|| {

@@ -79,7 +79,8 @@ impl From<thetahat_core::Action> for Action {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Innovation {
-    /// The measurement less its prediction, element by element, in the unit of the measurement. NaN where it is missing.
+    /// The measurement less its prediction, element by element, in the unit of the measurement. NaN where it is
+    /// missing.
     pub error: [Number; THETAHAT_MOST_OUTPUTS],
     /// The variance of each, given those after it in the same measurement. NaN where it is missing or not known.
     pub variance: [Number; THETAHAT_MOST_OUTPUTS],

@@ -117,7 +117,8 @@ fn init<const N: usize, const M: usize>(
     place.write(Modelled::<N, M> { filter, models: Models::NONE })
 }
 
-/// Makes a filter that starts from this state and the covariance of its error. Set the transition and the observation next.
+/// Makes a filter that starts from this state and the covariance of its error. Set the transition and the observation
+/// next.
 ///
 /// - kalman: where its handle goes. It points into the memory.
 /// - memory, bytes: at least `THETAHAT_KALMAN_WORDS(n, m)` words, and their size in bytes.
@@ -152,8 +153,8 @@ pub unsafe extern "C" fn thetahat_kalman_init(
 /// - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 /// - noise: Q, n x n; NULL for 0.
 ///
-/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE;
-/// NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
+/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0;
+/// NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; OVERFLOW.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_kalman_set_transition(
     kalman: *mut Kalman,
@@ -173,10 +174,12 @@ pub unsafe extern "C" fn thetahat_kalman_set_transition(
 /// Sets what is measured: y = H x + D u + v, v ~ (0, R). It may be set again at any time.
 ///
 /// - output_matrix: H, m x n.
-/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
+/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there
+///   are none.
 /// - noise: R, m x m; NULL for 0.
 ///
-/// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+/// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE; NOT_SYMMETRIC;
+/// NOT_POSITIVE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_kalman_set_observation(
     kalman: *mut Kalman,
@@ -204,7 +207,8 @@ pub unsafe extern "C" fn thetahat_kalman_set_state(kalman: *mut Kalman, state: *
     })
 }
 
-/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3 multiply-adds.
+/// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3
+/// multiply-adds.
 ///
 /// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
 #[unsafe(no_mangle)]
@@ -219,8 +223,8 @@ pub unsafe extern "C" fn thetahat_kalman_set_covariance(
     })
 }
 
-/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure than P
-/// says, as after a fault.
+/// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure
+/// than P says, as after a fault.
 ///
 /// Errors: OUT_OF_RANGE; OVERFLOW.
 #[unsafe(no_mangle)]
@@ -228,8 +232,9 @@ pub unsafe extern "C" fn thetahat_kalman_widen(kalman: *mut Kalman, factor: Numb
     code(|| memory::open(kalman)?.widen(factor))
 }
 
-/// Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at first.
-/// After `release` such measurements in a row, 1 ... 65535, those that follow are used all the same; 0 for never.
+/// Sets a gate: a measurement whose normalised innovation squared is above it is not used. INFINITY for none, as at
+/// first. After `release` such measurements in a row, 1 ... 65535, those that follow are used all the same; 0 for
+/// never.
 ///
 /// Errors: OUT_OF_RANGE.
 #[unsafe(no_mangle)]
@@ -253,8 +258,8 @@ pub unsafe extern "C" fn thetahat_kalman_predict(kalman: *mut Kalman, input: *co
     })
 }
 
-/// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used. About
-/// m (1.5 n^2 + 6 n) multiply-adds.
+/// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used.
+/// About m (1.5 n^2 + 6 n) multiply-adds.
 ///
 /// - input: u(k), the inputs of the transition; NULL where there are none.
 /// - measurement: y(k), m numbers.

@@ -30,8 +30,8 @@ pub enum Outliers {
     Used = 0,
     /// They correct as one of `threshold` standard deviations does: 3 loses nothing where there are none.
     Huber = 1,
-    /// Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them in a
-    /// row the next ones do.
+    /// Above a normalised innovation squared of `threshold`, such as 25, they correct nothing; after `release` of them
+    /// in a row the next ones do.
     Gate = 2,
 }
 

@@ -17,14 +17,15 @@
 //!
 //! # Sizes
 //!
-//! Every object lives in memory of the caller, and has the size that its init function is given: `&thetahat_rls_4` for four
-//! parameters. Such a constant refers to the code for its size, which is that of the core for `Const<4>`. So a program links
-//! the sizes that it names and no others (with `--gc-sections`), runs as fast as one in Rust, and has its bits.
+//! Every object lives in memory of the caller, and has the size that its init function is given: `&thetahat_rls_4` for
+//! four parameters. Such a constant refers to the code for its size, which is that of the core for `Const<4>`. So a
+//! program links the sizes that it names and no others (with `--gc-sections`), runs as fast as one in Rust, and has its
+//! bits.
 //!
-//! One code for all sizes up to a largest one, say 16, would serve four parameters with the memory and the time of sixteen:
-//! recursive least squares takes 1196 bytes in place of 140, and 3174 instructions a step in place of 392, on a Cortex-M4F.
-//! (Its code would be as large as that for one size; most firmware has one or two.) One that reads its size at run
-//! time would need a heap, as `Dyn` does.
+//! One code for all sizes up to a largest one, say 16, would serve four parameters with the memory and the time of
+//! sixteen: recursive least squares takes 1196 bytes in place of 140, and 3174 instructions a step in place of 392, on
+//! a Cortex-M4F. (Its code would be as large as that for one size; most firmware has one or two.) One that reads its
+//! size at run time would need a heap, as `Dyn` does.
 //!
 //! # Rules of the interface
 //!
@@ -33,8 +34,9 @@
 //! - An array that a function writes overlaps no other that it is given.
 //! - One thread, or interrupt, uses an object at a time.
 //!
-//! Whatever can be checked is: NULL, alignment, sizes, numbers, and that a handle is that of an initialised object of its
-//! kind. A call that does not answer 0 has changed nothing. Nothing allocates, panics, unwinds, or has a state of its own.
+//! Whatever can be checked is: NULL, alignment, sizes, numbers, and that a handle is that of an initialised object of
+//! its kind. A call that does not answer 0 has changed nothing. Nothing allocates, panics, unwinds, or has a state of
+//! its own.
 //!
 //! NaN is a missing sample, as in the core.
 
@@ -70,12 +72,12 @@ pub use rst::*;
 pub use sizes::*;
 pub use tuner::*;
 
-/// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library, whose
-/// feature `double` makes it `double`.
+/// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library,
+/// whose feature `double` makes it `double`.
 #[cfg(not(feature = "double"))]
 pub type Number = f32;
-/// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library, whose
-/// feature `double` makes it `double`.
+/// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library,
+/// whose feature `double` makes it `double`.
 #[cfg(feature = "double")]
 pub type Number = f64;
 /// The size of a number in the library: not that of a `thetahat_number` where the header and the library disagree.

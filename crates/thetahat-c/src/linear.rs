@@ -36,8 +36,8 @@ impl<const N: usize, const M: usize> Models<N, M> {
         self.observation.as_ref().ok_or(Error::NoModel)
     }
 
-    /// Sets F, n x n, G, n x inputs, and Q, n x n. What is not given is 0. The number of inputs does not change under a D that is
-    /// not 0: its columns are those of the inputs before.
+    /// Sets F, n x n, G, n x inputs, and Q, n x n. What is not given is 0. The number of inputs does not change under a
+    /// D that is not 0: its columns are those of the inputs before.
     pub(crate) fn set_transition(&mut self, given: &Matrices<'_>) -> Result<(), Error> {
         let has_direct = |own: &Observation<N, M>| own.input_matrix().iter().any(|entry| *entry != 0.0);
         if given.inputs != self.inputs && self.observation.as_ref().is_some_and(has_direct) {

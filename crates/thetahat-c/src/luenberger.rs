@@ -143,7 +143,8 @@ pub unsafe extern "C" fn thetahat_luenberger_init(
 /// - state_matrix: F, n x n, row by row, as all matrices.
 /// - input_matrix, inputs: G, n x inputs, with 0 ... THETAHAT_MOST_INPUTS inputs; NULL for none.
 ///
-/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0; NOT_FINITE.
+/// Errors: LENGTH for too many inputs; INPUTS if their number changes and the observation has a D that is not 0;
+/// NOT_FINITE.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_luenberger_set_transition(
     luenberger: *mut Luenberger,
@@ -162,7 +163,8 @@ pub unsafe extern "C" fn thetahat_luenberger_set_transition(
 /// Sets what is measured: y = H x + D u. It may be set again at any time.
 ///
 /// - output_matrix: H, m x n.
-/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there are none.
+/// - input_matrix: D, m x inputs, with the inputs of the transition, which is set before; NULL for 0, or where there
+///   are none.
 ///
 /// Errors: INPUTS if D is given and the transition is not set, or has no inputs; NOT_FINITE.
 #[unsafe(no_mangle)]
@@ -179,7 +181,8 @@ pub unsafe extern "C" fn thetahat_luenberger_set_observation(
     })
 }
 
-/// Sets the gain so that F - L H has these poles. Complex poles come in conjugate pairs, side by side. 4 n^3 multiply-adds.
+/// Sets the gain so that F - L H has these poles. Complex poles come in conjugate pairs, side by side. 4 n^3
+/// multiply-adds.
 ///
 /// - real, imaginary: the parts of the poles, n numbers each; all inside the unit circle.
 /// - weights: m numbers by which the outputs are combined into one; NULL for 1 each.

@@ -100,8 +100,8 @@ fn init<const N: usize>(place: Place<Rls>, scales: &[Number], learning: &Learnin
 /// - scales: n typical magnitudes of the regressors. They set the prior, P_jj = 100/scale_j^2.
 /// - learning: how old samples are forgotten and how it starts; NULL for the default.
 ///
-/// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the policy is
-/// out of its range.
+/// Errors: MEMORY_TOO_SMALL; NOT_FINITE; OUT_OF_RANGE if a scale is not above 0, or far from 1, or a number of the
+/// policy is out of its range.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_rls_init(
     rls: *mut *mut Rls,
@@ -199,8 +199,8 @@ pub unsafe extern "C" fn thetahat_rls_set_parameters(rls: *mut Rls, parameters: 
     })
 }
 
-/// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance stay.
-/// 2.5 n^3 multiply-adds.
+/// Sets P, the covariance of the parameters over the noise variance, n x n, symmetric. Parameters and noise variance
+/// stay. 2.5 n^3 multiply-adds.
 ///
 /// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE; TOO_LARGE.
 #[unsafe(no_mangle)]
@@ -212,8 +212,8 @@ pub unsafe extern "C" fn thetahat_rls_set_covariance(rls: *mut Rls, covariance: 
     })
 }
 
-/// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a plant
-/// that has changed, as after a repair.
+/// Takes P for larger by a factor, at least 1: what was learnt counts that much less, and the next samples more. For a
+/// plant that has changed, as after a repair.
 ///
 /// Errors: OUT_OF_RANGE; TOO_LARGE; OVERFLOW.
 #[unsafe(no_mangle)]

@@ -134,8 +134,8 @@ pub unsafe extern "C" fn thetahat_rst_start(
     })
 }
 
-/// One sample: the input from now on, within the limits. With a measurement that is NaN or infinite it stays as it was. 4 n
-/// multiply-adds.
+/// One sample: the input from now on, within the limits. With a measurement that is NaN or infinite it stays as it was.
+/// 4 n multiply-adds.
 ///
 /// Errors: NULL_POINTER.
 #[unsafe(no_mangle)]
@@ -182,8 +182,8 @@ pub struct RstPoles {
 
 type PlacePoles = fn(&[Number], &[Number], &WantedPoles<'_, Number>) -> Result<RstLaw, Error>;
 
-/// Pole placement for a number of coefficients: `thetahat_rst_place_2` for 2. It stands apart so that a controller with fixed
-/// coefficients does not link it.
+/// Pole placement for a number of coefficients: `thetahat_rst_place_2` for 2. It stands apart so that a controller with
+/// fixed coefficients does not link it.
 pub struct RstPlaceSize {
     place: PlacePoles,
 }
@@ -211,16 +211,16 @@ fn place<const N: usize>(
 /// Computes the controller of lowest order that places the poles of the closed loop with a model A(q) y = B(q) u, for
 /// `thetahat_rst_init`. About 10 n^3 flops.
 ///
-/// - size: `&thetahat_rst_place_n`, with n = na + nb - 1, one more with an integrator, where na and nb are the highest powers of
-///   1/q in A and B.
+/// - size: `&thetahat_rst_place_n`, with n = na + nb - 1, one more with an integrator, where na and nb are the highest
+///   powers of 1/q in A and B.
 /// - a, a_count: A, na + 1 coefficients that begin with 1.
 /// - b, b_count: B, nb + 1 coefficients that begin with 0, and with more zeros for a longer delay.
 /// - poles: where the poles shall be.
 /// - law: where the controller goes.
 ///
-/// Errors, after which nothing is written: NOT_FINITE; OUT_OF_RANGE if a polynomial does not begin as it must, B(1) is 0, a zero
-/// that shall be cancelled is not inside the unit circle, or A and B have a common factor, nearly; ORDERS if n is another;
-/// LENGTH if Am Ao has more than n coefficients after its 1; TOO_LARGE; OVERFLOW.
+/// Errors, after which nothing is written: NOT_FINITE; OUT_OF_RANGE if a polynomial does not begin as it must, B(1) is
+/// 0, a zero that shall be cancelled is not inside the unit circle, or A and B have a common factor, nearly; ORDERS if
+/// n is another; LENGTH if Am Ao has more than n coefficients after its 1; TOO_LARGE; OVERFLOW.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_rst_place(
     size: *const RstPlaceSize,

@@ -104,7 +104,8 @@ impl From<CoreState> for TunerState {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TunerWish {
-    /// The natural frequency of the response to the set point, in rad a sample: about 4/(damping n) to settle within n samples.
+    /// The natural frequency of the response to the set point, in rad a sample: about 4/(damping n) to settle within n
+    /// samples.
     pub frequency: Number,
     /// Its damping, above 0 and at most 1.
     pub damping: Number,
@@ -190,15 +191,16 @@ impl TunerWish {
     }
 }
 
-/// A controller that learns its plant while it runs: a model that it is designed for anew (indirect), or its own coefficients
-/// (direct).
+/// A controller that learns its plant while it runs: a model that it is designed for anew (indirect), or its own
+/// coefficients (direct).
 pub struct Tuner {
     _opaque: [u8; 0],
 }
 
-/// The way and the orders of a `thetahat_tuner`. `thetahat_indirect_2_3`: a plant with na = 2 and nb = 3 coefficients of B(q), one
-/// more than its order for each sample of dead time; the controller integrates. `thetahat_direct_2_2_1`: na = 2, nb = 2, and an
-/// input that acts after 1 sample; for plants whose inverse is stable and whose delay is known. Both have a constant for loads.
+/// The way and the orders of a `thetahat_tuner`. `thetahat_indirect_2_3`: a plant with na = 2 and nb = 3 coefficients
+/// of B(q), one more than its order for each sample of dead time; the controller integrates. `thetahat_direct_2_2_1`:
+/// na = 2, nb = 2, and an input that acts after 1 sample; for plants whose inverse is stable and whose delay is known.
+/// Both have a constant for loads.
 pub struct TunerSize {
     init: fn(Place<Tuner>, &TunerWish, &Learning) -> Made<Tuner>,
     view: View<dyn Tuning>,
@@ -436,8 +438,8 @@ pub unsafe extern "C" fn thetahat_tuner_usual(
 /// Makes a tuner that knows nothing yet.
 ///
 /// - tuner: where its handle goes. It points into the memory.
-/// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and their size in
-///   bytes.
+/// - memory, bytes: at least `THETAHAT_INDIRECT_WORDS(na, nb)` or `THETAHAT_DIRECT_WORDS(na, nb, delay)` words, and
+///   their size in bytes.
 /// - size: `&thetahat_indirect_na_nb` or `&thetahat_direct_na_nb_delay`.
 /// - wish: what is asked for.
 /// - learning: how old samples are forgotten and how it starts, without its dead zone; NULL for the default. The random
@@ -463,9 +465,9 @@ pub unsafe extern "C" fn thetahat_tuner_init(
     })
 }
 
-/// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement that is NaN
-/// is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design of about 10 n^3 + 560 n
-/// flops, n = na + nb.
+/// One sample: the tuner learns from the measurement, and gives the input from now on, within the limits. A measurement
+/// that is NaN is missing. A step costs what that of a recursive ARX estimator does, and in an indirect tuner a design
+/// of about 10 n^3 + 560 n flops, n = na + nb.
 ///
 /// Errors: NULL_POINTER.
 #[unsafe(no_mangle)]
@@ -492,8 +494,8 @@ pub unsafe extern "C" fn thetahat_tuner_applied(tuner: *mut Tuner, input: Number
     })
 }
 
-/// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest amplitude of
-/// probing, with either sign.
+/// Excites the plant for so many samples: the input is that of the controller with the share 0 ... 1 of the largest
+/// amplitude of probing, with either sign.
 ///
 /// Errors: OUT_OF_RANGE.
 #[unsafe(no_mangle)]
@@ -513,8 +515,8 @@ pub unsafe extern "C" fn thetahat_tuner_set_adaptation(tuner: *mut Tuner, on: u3
 /// Reads what it did in the latest sample, and what it has learnt. Each of the places may be NULL.
 ///
 /// - state: a `thetahat_tuner_state`.
-/// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the coefficients of R, nb +
-///   delay - 1, those of S, na, and the constant.
+/// - parameters: of an indirect tuner a_1 ..., b_1 ..., the constant: na + nb + 1 numbers. Of a direct one the
+///   coefficients of R, nb + delay - 1, those of S, na, and the constant.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn thetahat_tuner_read(
     tuner: *const Tuner,

@@ -210,7 +210,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
 
     /// The same with another start. See [`RecursiveLeastSquares::with_start`].
     ///
-    /// Errors: [`Error::OutOfRange`] for any but the standard one with nc above 0: residuals are not known before parameters are.
+    /// Errors: [`Error::OutOfRange`] for any but the standard one with nc above 0: residuals are not known before
+    /// parameters are.
     pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
         if self.nc > 0 && start != RlsStart::Standard {
             return Err(Error::OutOfRange { argument: "start", range: "standard, as nc is above 0" });
@@ -259,8 +260,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         Ok(self.step(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a missing
-    /// sample.
+    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a
+    /// missing sample.
     ///
     /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
@@ -276,8 +277,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
 
     /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
     ///
-    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller that
-    /// knows u(k-1) when y(k) arrives.
+    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
+    /// that knows u(k-1) when y(k) arrives.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
         check_samples(inputs, &[output], self.gradients.ncols())?;
@@ -368,9 +369,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         predict_ahead(workspace, parameters, self.residual, future_inputs, outputs)
     }
 
-    /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one was
-    /// out. See [`RecursiveLeastSquares::keep_within`], whose errors it has. C has no limits but its stability: where
-    /// the nearest point has no stable C, each parameter is cut off by itself.
+    /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one
+    /// was out. See [`RecursiveLeastSquares::keep_within`], whose errors it has. C has no limits but its stability:
+    /// where the nearest point has no stable C, each parameter is cut off by itself.
     pub fn keep_within(&mut self, limits: &[RangeInclusive<T>]) -> Result<bool, Error> {
         let RecursiveArmax { estimator, gradients, nc, scratch, .. } = self;
         let size = gradients.shape_generic().0;

@@ -36,9 +36,9 @@ use crate::{
 /// applied(u(k))       what acts from now on, until the next measurement
 /// ```
 ///
-/// A call that is left out is a missing sample, and never shifts one signal against the other: after two measurements in
-/// a row the input between them is missing, after two inputs in a row the output between them. A missing number is NaN.
-/// Time goes on, and while it sits in a tap nothing is corrected.
+/// A call that is left out is a missing sample, and never shifts one signal against the other: after two measurements
+/// in a row the input between them is missing, after two inputs in a row the output between them. A missing number is
+/// NaN. Time goes on, and while it sits in a tap nothing is corrected.
 ///
 /// [`log_row`](RecursiveArx::log_row) takes u(k) and y(k) that were recorded at the same instant k, as a row of a log
 /// holds them: it is `measured(y(k))`, then `applied(u(k))`. Where an input acts in its own sample (nk = 0), y(k) needs
@@ -47,9 +47,9 @@ use crate::{
 /// # Noise
 ///
 /// The equation has its noise e inside: a disturbance of the plant, filtered by 1/A(q). Then the estimate has no bias,
-/// in a closed loop either, if the loop has a delay and is excited, as by changes of the set point. Noise of the sensor is
-/// another: it enters φ, and pulls A(q) towards 1. With the plant y(k) = 0.9 y(k-1) + 0.08 u(k-1) in an open loop,
-/// u a random ±1, and a standard deviation of the noise half that of y, a_1 comes out as -0.72; with a tenth, as -0.89.
+/// in a closed loop either, if the loop has a delay and is excited, as by changes of the set point. Noise of the sensor
+/// is another: it enters φ, and pulls A(q) towards 1. With the plant y(k) = 0.9 y(k-1) + 0.08 u(k-1) in an open loop, u
+/// a random ±1, and a standard deviation of the noise half that of y, a_1 comes out as -0.72; with a tenth, as -0.89.
 /// Where that matters, slow the sampling, or model the noise: [`RecursiveArmax`](crate::RecursiveArmax).
 ///
 /// # Sizes
@@ -133,8 +133,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Ok(RecursiveArx { estimator: RecursiveLeastSquares::new(&scales, forgetting)?, lags })
     }
 
-    /// The same as [`new`](RecursiveArx::new) for orders that are constants: wrong sizes do not compile. (With `Dyn`, which has no
-    /// size to compare, they are made to fit.)
+    /// The same as [`new`](RecursiveArx::new) for orders that are constants: wrong sizes do not compile. (With `Dyn`,
+    /// which has no size to compare, they are made to fit.)
     ///
     /// Errors: those of `new` that are left, of the scales and the policy.
     ///
@@ -210,9 +210,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// where numbers that are accepted one by one would overflow together with P or the parameters: nothing is
     /// corrected then, but time goes on, so that a large sample leaves the taps again.
     ///
-    /// Errors, after which nothing has changed, time included: [`Error::InputFirst`] if an input acts in its own sample:
-    /// [`log_row`](RecursiveArx::log_row) takes that; [`Error::Infinite`]; [`Error::TooLarge`] for a sample whose square
-    /// times n exceeds [`Real::LARGEST_ENTRY`] (7e13/√n in `f32`). If time should go on, pass NaN instead.
+    /// Errors, after which nothing has changed, time included: [`Error::InputFirst`] if an input acts in its own
+    /// sample: [`log_row`](RecursiveArx::log_row) takes that; [`Error::Infinite`]; [`Error::TooLarge`] for a sample
+    /// whose square times n exceeds [`Real::LARGEST_ENTRY`] (7e13/√n in `f32`). If time should go on, pass NaN instead.
     ///
     /// 1.5 n² + 7 n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
@@ -221,8 +221,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Ok(self.learn(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the plant got
-    /// it (so after all limits). NaN is a missing sample.
+    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the plant
+    /// got it (so after all limits). NaN is a missing sample.
     ///
     /// If no measurement has come since the inputs before, that one is missing, and time goes on first.
     ///
@@ -241,9 +241,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
 
     /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
     ///
-    /// With every nk at least 1 it is [`measured`](RecursiveArx::measured) and then [`applied`](RecursiveArx::applied), to
-    /// the bit: u(k) has no part in the innovation of y(k). It is not the call for a controller that knows u(k-1) when
-    /// y(k) arrives: to take that as u(k) would make the model a sample late.
+    /// With every nk at least 1 it is [`measured`](RecursiveArx::measured) and then [`applied`](RecursiveArx::applied),
+    /// to the bit: u(k) has no part in the innovation of y(k). It is not the call for a controller that knows u(k-1)
+    /// when y(k) arrives: to take that as u(k) would make the model a sample late.
     ///
     /// Errors, after which nothing has changed, time included: those of the two, but for [`Error::InputFirst`].
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
@@ -275,11 +275,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
 
     /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
     ///
-    /// `future_inputs` are those to come, each with one number for every input, and as many as outputs. Which is the first
-    /// follows from the latest call: after [`measured`](RecursiveArx::measured) of y(k) it is u(k), which is still to be
-    /// chosen; after [`applied`](RecursiveArx::applied) or [`log_row`](RecursiveArx::log_row) of u(k) it is u(k+1). (With
-    /// nk = 1 the last one acts on nothing then, but is there.) Predicted outputs take the place of measured ones. An
-    /// output that depends on a missing sample is NaN.
+    /// `future_inputs` are those to come, each with one number for every input, and as many as outputs. Which is the
+    /// first follows from the latest call: after [`measured`](RecursiveArx::measured) of y(k) it is u(k), which is
+    /// still to be chosen; after [`applied`](RecursiveArx::applied) or [`log_row`](RecursiveArx::log_row) of u(k) it is
+    /// u(k+1). (With nk = 1 the last one acts on nothing then, but is there.) Predicted outputs take the place of
+    /// measured ones. An output that depends on a missing sample is NaN.
     ///
     /// The state of the estimator does not change. With `Dyn` the delay lines are cloned. n multiply-adds and moves
     /// a step.
@@ -426,9 +426,9 @@ pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
     sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
 }
 
-/// Runs a model on from `lags`: its predictions become its outputs, those of several outputs one after the other, with a
-/// column of parameters for each. Of the residuals, if the model has them, the last one is known, and those to come are
-/// expected to be 0.
+/// Runs a model on from `lags`: its predictions become its outputs, those of several outputs one after the other, with
+/// a column of parameters for each. Of the residuals, if the model has them, the last one is known, and those to come
+/// are expected to be 0.
 pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
     lags: &mut Lags<T, N, D>,
     parameters: &[T],

@@ -17,8 +17,9 @@ use crate::{Error, Real};
 /// g(z) = θ_1 f_1(z) + θ_2 f_2(z) + …
 /// ```
 ///
-/// [`Polynomial`], [`Radial`], [`Spline`], [`Network`], [`Local`] and [`Neighbours`] are views of numbers that may stand in flash. Any other functions can be given by this
-/// trait; they are computed without a heap, and each is about 1 where z is, so that one prior serves all.
+/// [`Polynomial`], [`Radial`], [`Spline`], [`Network`], [`Local`] and [`Neighbours`] are views of numbers that may
+/// stand in flash. Any other functions can be given by this trait; they are computed without a heap, and each is about
+/// 1 where z is, so that one prior serves all.
 ///
 /// ```
 /// use thetahat_core::{Basis, Error};
@@ -160,8 +161,8 @@ fn product<'a, T: Real>(first: T, factors: impl Iterator<Item = &'a u16>, z: &[T
     factors.fold(first, |product, &factor| product * z.get(usize::from(factor)).copied().unwrap_or(T::NAN))
 }
 
-/// Radial basis functions exp(-|z - α_j|²/σ_j²), and with `linear` 1 and each regressor before them (Chen, Cowan and Grant
-/// 1991, with σ² for their 2 σ²).
+/// Radial basis functions exp(-|z - α_j|²/σ_j²), and with `linear` 1 and each regressor before them (Chen, Cowan and
+/// Grant 1991, with σ² for their 2 σ²).
 ///
 /// The exponential is that of the crate libm, so that every machine gives the same bits.
 ///
@@ -234,13 +235,15 @@ impl<T: Real> Basis<T> for Radial<'_, T> {
     }
 }
 
-/// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each regressor.
+/// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each
+/// regressor.
 ///
-/// A natural cubic spline with the knots k_1 < … < k_K is a cubic between them, has two continuous derivatives, and is a line beyond
-/// the outer knots. Its second derivative is a sum of the K - 2 hats (linear B-splines) of three knots in a row, so that 1, x and the
-/// hats integrated twice are a basis (Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009, section
-/// 5.2.1, which spans the same with truncated powers). A hat of area 1 integrated twice is a bend: 0 before its first knot, of slope 1
-/// after its last one. Truncated powers grow like x³ and are nearly sums of one another; bends grow like x.
+/// A natural cubic spline with the knots k_1 < … < k_K is a cubic between them, has two continuous derivatives, and is
+/// a line beyond the outer knots. Its second derivative is a sum of the K - 2 hats (linear B-splines) of three knots in
+/// a row, so that 1, x and the hats integrated twice are a basis (Hastie, Tibshirani and Friedman, The Elements of
+/// Statistical Learning, 2nd ed. 2009, section 5.2.1, which spans the same with truncated powers). A hat of area 1
+/// integrated twice is a bend: 0 before its first knot, of slope 1 after its last one. Truncated powers grow like x³
+/// and are nearly sums of one another; bends grow like x.
 ///
 /// ```
 /// use thetahat_core::{Basis, Spline};

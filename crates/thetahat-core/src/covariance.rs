@@ -415,8 +415,8 @@ impl<T: Real, N: Dimension> Covariance<T, N> {
 macro_rules! constant {
     ($real:ty) => {
         impl<const N: usize> Covariance<$real, Const<N>> {
-            /// Independent elements, with these variances, as a constant of the program. A wrong number does not compile, where the
-            /// constant panics for the error.
+            /// Independent elements, with these variances, as a constant of the program. A wrong number does not
+            /// compile, where the constant panics for the error.
             ///
             /// Errors: [`Error::NotFinite`]; [`Error::Negative`].
             ///
@@ -528,8 +528,8 @@ fn eliminate<T: Real>(rest: &mut [T], given: &[T], factor: &mut [T], weights: &m
     })
 }
 
-/// Whether x, which is above 0, exceeds √(p q). A variance below `MIN_POSITIVE` counts as 0. (A square root would link the
-/// one of the mathematical library, which is longer than all of this.)
+/// Whether x, which is above 0, exceeds √(p q). A variance below `MIN_POSITIVE` counts as 0. (A square root would link
+/// the one of the mathematical library, which is longer than all of this.)
 fn exceeds<T: Real>(x: T, p: T, q: T) -> bool {
     let (small, large) = if p < q { (p, q) } else { (q, p) };
     small < T::MIN_POSITIVE || x / large > small / x

@@ -73,18 +73,18 @@ pub struct Alarm<T> {
 /// variance      g <- max(0, g + (z²/2 - ln 2)/2)       a variance of 2 against 1
 /// ```
 ///
-/// and an alarm is given where g exceeds its threshold. Each chart is the quickest for its change, in the worst case, among
-/// those with the same mean time between false alarms (Lorden 1971; Moustakides 1986). It finds other changes too, smaller
-/// ones later. After an alarm, what exceeded its threshold starts again from 0; the other charts
-/// go on.
+/// and an alarm is given where g exceeds its threshold. Each chart is the quickest for its change, in the worst case,
+/// among those with the same mean time between false alarms (Lorden 1971; Moustakides 1986). It finds other changes
+/// too, smaller ones later. After an alarm, what exceeded its threshold starts again from 0; the other charts go on.
 ///
 /// An estimator that forgets follows a change after some time, and its innovations become white again: then the
 /// charts fall back by themselves.
 ///
 /// # Several outputs
 ///
-/// The innovation of a filter with m outputs has no one direction: [`update_all`](ChangeDetector::update_all) watches its
-/// normalised square alone, chi-square with as many degrees of freedom as elements were measured, mean m and variance 2 m.
+/// The innovation of a filter with m outputs has no one direction: [`update_all`](ChangeDetector::update_all) watches
+/// its normalised square alone, chi-square with as many degrees of freedom as elements were measured, mean m and
+/// variance 2 m.
 ///
 /// ```text
 /// variance      g <- max(0, g + (nis/2 - m ln 2)/2)    a covariance of 2 S against S
@@ -94,11 +94,11 @@ pub struct Alarm<T> {
 ///
 /// # Thresholds
 ///
-/// They set the mean time between false alarms. For Gaussian innovations both mean charts together give one in
-/// 168 samples with the threshold 4, in 465 with 5, and roughly e times as many for each unit more. As each step is a
-/// log-likelihood ratio, a chart with the threshold h gives at most one false alarm in exp(h) samples on average, whatever m
-/// is, and whatever is missing. The crate `thetahat` computes the thresholds from the interval that is asked for and m. Infinity
-/// turns a chart off.
+/// They set the mean time between false alarms. For Gaussian innovations both mean charts together give one in 168
+/// samples with the threshold 4, in 465 with 5, and roughly e times as many for each unit more. As each step is a
+/// log-likelihood ratio, a chart with the threshold h gives at most one false alarm in exp(h) samples on average,
+/// whatever m is, and whatever is missing. The crate `thetahat` computes the thresholds from the interval that is asked
+/// for and m. Infinity turns a chart off.
 ///
 /// # Cost
 ///

@@ -195,8 +195,8 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         self.linear.set_release(count);
     }
 
-    /// Sets how often a measurement update linearises: see [`with_iterations`](ExtendedKalmanFilter::with_iterations), whose
-    /// errors it has.
+    /// Sets how often a measurement update linearises: see [`with_iterations`](ExtendedKalmanFilter::with_iterations),
+    /// whose errors it has.
     pub fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
         if count == 0 {
             return Err(Error::OutOfRange { argument: "iterations", range: "1 or more" });

@@ -1,7 +1,7 @@
 //! How fast a recursive estimator forgets, and how it starts.
 //!
-//! Another policy is a variant of [`Forgetting`], an entry of [`TABLE`], and an arm in each match of this file: what does not
-//! know of it does not compile. The estimators, the command line, documents and Python take all from here.
+//! Another policy is a variant of [`Forgetting`], an entry of [`TABLE`], and an arm in each match of this file: what
+//! does not know of it does not compile. The estimators, the command line, documents and Python take all from here.
 
 use crate::error::check_length;
 use crate::{Error, Real};
@@ -42,9 +42,9 @@ use crate::{Error, Real};
 ///
 /// Nothing but samples makes P smaller. So σ²P is at least the covariance of the errors, however long an input is held:
 /// where a direction is not excited, its standard errors grow to their bound, and stay. Where two inputs cannot be told
-/// apart, they say so. (A pseudo-measurement θ_j + v = θ̂_j of each parameter, the usual way to keep P bounded, tells P what
-/// nobody measured: with λ = 0.9 and an input that was held for 10^5 samples a parameter was 40 of its standard errors
-/// from the truth, in a control loop 400.)
+/// apart, they say so. (A pseudo-measurement θ_j + v = θ̂_j of each parameter, the usual way to keep P bounded, tells P
+/// what nobody measured: with λ = 0.9 and an input that was held for 10^5 samples a parameter was 40 of its standard
+/// errors from the truth, in a control loop 400.)
 ///
 /// # What each is good at
 ///
@@ -64,9 +64,9 @@ use crate::{Error, Real};
 /// | variable, 0.99 | 0.003 | 0.010 | 0.023 | 0.003 | 2.21 | 1.86 | 1.28 | 2.40 | 0.95 | 0.97 |
 ///
 /// (Printed by `cargo test -p thetahat-core --test forgetting table -- --nocapture`.) The intervals of the random walk
-/// are for parameters that walk as it says. Directly after a jump no interval holds the truth, whatever the policy. Where
-/// the regressors tell too little of a parameter, in closed loop without changes of the set point for instance, intervals
-/// are wider than need be: up to all of them hold the truth.
+/// are for parameters that walk as it says. Directly after a jump no interval holds the truth, whatever the policy.
+/// Where the regressors tell too little of a parameter, in closed loop without changes of the set point for instance,
+/// intervals are wider than need be: up to all of them hold the truth.
 ///
 /// # What is forgotten when
 ///
@@ -101,8 +101,8 @@ pub enum Forgetting<T> {
     /// P shrinks as 1/k. In `f32` that works for a finite time only: rounding is not forgotten either. With four
     /// parameters it exceeds one standard error after 9·10^7 samples (measured by `make soak`).
     None,
-    /// A sample k samples old weighs λ^k, whether the new ones tell anything or not (Ljung and Söderström, Theory and Practice of Recursive Identification,
-    /// 1983, section 2.6).
+    /// A sample k samples old weighs λ^k, whether the new ones tell anything or not (Ljung and Söderström, Theory and
+    /// Practice of Recursive Identification, 1983, section 2.6).
     ///
     /// ```text
     /// θ̂ = arg min Σ λ^(t-k) (y(k) - φ(k)'θ)²,          P <- (P - P φ φ'P / (λ + φ'P φ)) / λ
@@ -139,8 +139,8 @@ pub enum Forgetting<T> {
     /// - A held input is not silence: until U has turned to it, all of φ is new. That costs all but a hundredth of
     ///   what is known of other directions, and noise beside it then does the same as with exponential forgetting
     ///   (the column "held").
-    /// - The order of the regressors decides of which of two that are correlated something is forgotten first. In closed
-    ///   loop the standard errors differed by a tenth, elsewhere by less (measured).
+    /// - The order of the regressors decides of which of two that are correlated something is forgotten first. In
+    ///   closed loop the standard errors differed by a tenth, elsewhere by less (measured).
     ///
     /// Source: the rule is ours. Its relative on the eigenvectors of P⁻¹ is that of Goel, Bruce and Bernstein,
     /// Recursive least squares with variable-direction forgetting, 2020.
@@ -503,8 +503,8 @@ impl ForgettingPolicy {
         pairs.find(|(number, value)| number.check(*value, 0.0, first).is_err())
     }
 
-    /// The policy with these numbers, each in its range. That a factor is above n/(n + 1) is checked when an estimator with n
-    /// parameters is made.
+    /// The policy with these numbers, each in its range. That a factor is above n/(n + 1) is checked when an estimator
+    /// with n parameters is made.
     ///
     /// Errors: [`Error::Length`] for another number of them, [`Error::OutOfRange`] with the name of one.
     pub fn with(&self, numbers: &[f64]) -> Result<Forgetting<f64>, Error> {

@@ -5,8 +5,9 @@ use crate::rls::is_small;
 use crate::triangle::{column, column_mut};
 use crate::ud::{add_multiple, copy};
 
-/// ψ(k) = φ(k) - c_1 ψ(k-1) - … - c_nc ψ(k-nc), from past gradients in the columns of `past`. Returns false where that has
-/// grown too large, as it may while C changes, although every single C is stable: then ψ is φ, and the past is to be forgotten.
+/// ψ(k) = φ(k) - c_1 ψ(k-1) - … - c_nc ψ(k-nc), from past gradients in the columns of `past`. Returns false where that
+/// has grown too large, as it may while C changes, although every single C is stable: then ψ is φ, and the past is to
+/// be forgotten.
 #[inline(always)]
 pub(crate) fn filter<T: Real>(gradient: &mut [T], regressor: &[T], polynomial: &[T], past: &[T]) -> bool {
     copy(regressor, gradient);

@@ -24,18 +24,19 @@ use nalgebra::OVector;
 pub enum Action {
     /// The estimate was corrected.
     Updated,
-    /// The estimate was corrected, and a variance has grown to its bound: samples tell too little of some direction of the
-    /// parameters, and nothing is forgotten there. See [`Forgetting`](crate::Forgetting#the-bound).
+    /// The estimate was corrected, and a variance has grown to its bound: samples tell too little of some direction of
+    /// the parameters, and nothing is forgotten there. See [`Forgetting`](crate::Forgetting#the-bound).
     Capped,
-    /// The estimate was corrected by less than the innovation asks for, so that C(q) or F(q) stays stable, or parameters stay
-    /// within limits.
+    /// The estimate was corrected by less than the innovation asks for, so that C(q) or F(q) stays stable, or
+    /// parameters stay within limits.
     Projected,
     /// The measurement is missing (NaN): time went on, nothing was corrected.
     Missing,
     /// The delay lines are not filled yet, at the start or after missing samples, or hold numbers too large to be
     /// absorbed: time went on, nothing was corrected.
     NotReady,
-    /// Regressors are collected until they have full rank: there is no estimate yet, or that of an earlier window stays.
+    /// Regressors are collected until they have full rank: there is no estimate yet, or that of an earlier window
+    /// stays.
     Collecting,
     /// Adaptation is off: the innovation is computed, nothing was corrected.
     Frozen,
@@ -43,8 +44,8 @@ pub enum Action {
     Skipped,
     /// The normalised innovation squared is above the gate: the measurement was not used.
     Gated,
-    /// It is above the gate, and so were those before it, so many in a row that the filter must be wrong and not they: the
-    /// measurement was used.
+    /// It is above the gate, and so were those before it, so many in a row that the filter must be wrong and not they:
+    /// the measurement was used.
     Released,
     /// The innovation is an outlier: the estimate was corrected by less than it asks for. See
     /// [`Outliers::Huber`](crate::Outliers::Huber).

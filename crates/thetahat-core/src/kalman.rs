@@ -109,8 +109,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
     /// The same with a gate: a measurement whose normalised innovation squared is above `gate` is not used, and
     /// [`Action::Gated`] says so. Infinite at first, which is no gate.
     ///
-    /// A gate can lock out: once the state is far off, as after a jump of the plant, all measurements are above it, and P
-    /// grows too slowly to let them in. [`gated_in_a_row`](KalmanFilter::gated_in_a_row) tells, and
+    /// A gate can lock out: once the state is far off, as after a jump of the plant, all measurements are above it, and
+    /// P grows too slowly to let them in. [`gated_in_a_row`](KalmanFilter::gated_in_a_row) tells, and
     /// [`with_release`](KalmanFilter::with_release) lets go.
     ///
     /// Errors: [`Error::OutOfRange`] if it is not above 0.
@@ -119,12 +119,14 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         Ok(self)
     }
 
-    /// The same with a gate that lets go: after `count` measurements in a row that were above it, those that follow are used,
-    /// and [`Action::Released`] says so, until one is within the gate again. 0 is a gate that never lets go, as at first.
+    /// The same with a gate that lets go: after `count` measurements in a row that were above it, those that follow are
+    /// used, and [`Action::Released`] says so, until one is within the gate again. 0 is a gate that never lets go, as
+    /// at first.
     ///
-    /// An outlier is rarely followed by another: with independent outliers, one in twenty say, `count` of them in a row come
-    /// once in 20^count samples. Each released measurement is weighed as any other: where P is small the state comes back
-    /// slowly, by the gain of the filter. ([`widen`](KalmanFilter::widen) makes it quicker, where the plant has jumped.)
+    /// An outlier is rarely followed by another: with independent outliers, one in twenty say, `count` of them in a row
+    /// come once in 20^count samples. Each released measurement is weighed as any other: where P is small the state
+    /// comes back slowly, by the gain of the filter. ([`widen`](KalmanFilter::widen) makes it quicker, where the plant
+    /// has jumped.)
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
@@ -149,8 +151,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         self
     }
 
-    /// Puts the state where it is known to be. P stays: see [`set_covariance`](KalmanFilter::set_covariance). What the gate has
-    /// counted starts anew.
+    /// Puts the state where it is known to be. P stays: see [`set_covariance`](KalmanFilter::set_covariance). What the
+    /// gate has counted starts anew.
     ///
     /// Errors, after which nothing has changed: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`).
     ///
@@ -184,8 +186,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         Ok(())
     }
 
-    /// Takes P for larger by a factor: the next measurements move the state more. For a state that is less sure than P says, as
-    /// after a fault. No variance shrinks, and one of 0 stays 0.
+    /// Takes P for larger by a factor: the next measurements move the state more. For a state that is less sure than P
+    /// says, as after a fault. No variance shrinks, and one of 0 stays 0.
     ///
     /// ```text
     /// P <- factor P,     factor >= 1
@@ -198,9 +200,11 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         Ok(())
     }
 
-    /// The same by a sum, P <- P + Q: what has come to the state beside the process noise, as where the plant was moved.
+    /// The same by a sum, P <- P + Q: what has come to the state beside the process noise, as where the plant was
+    /// moved.
     ///
-    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`); [`Error::Overflow`]. 1.5 n³ multiply-adds.
+    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`); [`Error::Overflow`]. 1.5 n³
+    /// multiply-adds.
     pub fn widen_by(&mut self, covariance: &Covariance<T, N>) -> Result<(), Error> {
         self.covariance = self.covariance.plus(covariance)?;
         Ok(())
@@ -221,8 +225,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         self.release = count;
     }
 
-    /// The same to the bit, with its size in another type, see [`Covariance::to_size`]. With `Const` a step needs no heap,
-    /// and is quicker.
+    /// The same to the bit, with its size in another type, see [`Covariance::to_size`]. With `Const` a step needs no
+    /// heap, and is quicker.
     ///
     /// Errors: [`Error::Length`] if it has another size.
     pub fn to_size<K: Dimension>(&self, size: K) -> Result<KalmanFilter<T, K>, Error> {
@@ -257,8 +261,8 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         self.release
     }
 
-    /// How many of the latest measurements were above the gate, since the last one within it, at most 65,535; missing ones do
-    /// not count. More than a few: the gate has locked the filter out.
+    /// How many of the latest measurements were above the gate, since the last one within it, at most 65,535; missing
+    /// ones do not count. More than a few: the gate has locked the filter out.
     pub fn gated_in_a_row(&self) -> u16 {
         self.gated
     }
@@ -593,7 +597,8 @@ fn whiten<T: Real, M: Dimension>(
 macro_rules! constant {
     ($real:ty) => {
         impl<const N: usize> KalmanFilter<$real, Const<N>> {
-            /// The same as [`new`](KalmanFilter::new) as a constant, for a filter in a `static`: nothing is set up at run time.
+            /// The same as [`new`](KalmanFilter::new) as a constant, for a filter in a `static`: nothing is set up at
+            /// run time.
             ///
             /// Errors: [`Error::NotFinite`].
             ///

@@ -82,7 +82,8 @@ impl Line {
 /// feature `alloc` both may be `Dyn`: then they follow from the orders, and `new` allocates, and fails as a
 /// `Vec` does if there is no memory.
 ///
-/// Memory: N + D numbers, 6 N bytes and three machine words. Plain data: a clone can be driven on with predicted outputs.
+/// Memory: N + D numbers, 6 N bytes and three machine words. Plain data: a clone can be driven on with predicted
+/// outputs.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector3};
@@ -143,8 +144,8 @@ pub struct Lags<T: Real, N: Dimension, D: Dimension = Const<1>> {
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
     /// Empty delay lines: every earlier sample is missing.
     ///
-    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D`
-    /// is too small for the delays; these and [`Error::Length`] for an na, an nb, an nk or a number of channels above 65,535.
+    /// Errors: [`Error::Orders`] if the orders do not make exactly `N` parameters; [`Error::Delays`] if `D` is too
+    /// small for the delays; these and [`Error::Length`] for an na, an nb, an nk or a number of channels above 65,535.
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;

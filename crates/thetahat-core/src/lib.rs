@@ -73,11 +73,11 @@
 //!
 //! - `alloc`: sizes known only at run time, nalgebra's `Dyn`, for callers with a heap, such as a batch
 //!   program that reads the orders from its user. Off by default, so that firmware needs no allocator.
-//! - `serde`: snapshots that can be written and read back, and [`Error`], [`Action`] and [`Innovation`] for telemetry (an error is written
-//!   only: its words are constants of the program). Off by default, as a clone is a snapshot too.
-//! - `defmt`: `defmt::Format` of [`Error`], [`Action`], [`Innovation`] and [`Alarm`], whose words stay on the host. On microcontrollers
-//!   only (`target_os = "none"`), where the program brings the logger; nalgebra's own feature `defmt` has that of vectors, so of states.
-//!   Off by default, as a program that logs in another way needs none of it.
+//! - `serde`: snapshots that can be written and read back, and [`Error`], [`Action`] and [`Innovation`] for telemetry
+//!   (an error is written only: its words are constants of the program). Off by default, as a clone is a snapshot too.
+//! - `defmt`: `defmt::Format` of [`Error`], [`Action`], [`Innovation`] and [`Alarm`], whose words stay on the host. On
+//!   microcontrollers only (`target_os = "none"`), where the program brings the logger; nalgebra's own feature `defmt`
+//!   has that of vectors, so of states. Off by default, as a program that logs in another way needs none of it.
 //! - `autodiff`: models that are written as one function, with exact Jacobians from dual numbers. Off by default,
 //!   as linear models and Jacobians by hand need none.
 //!
@@ -99,8 +99,8 @@
 //!
 //! # Missing and infinite numbers
 //!
-//! NaN is a missing sample: in a delay line, a regressor, an output, an element of a measurement. Time goes on, nothing is
-//! corrected by it, and the [`Action`] says so. Anywhere else NaN is an error, and infinity is an error everywhere.
+//! NaN is a missing sample: in a delay line, a regressor, an output, an element of a measurement. Time goes on, nothing
+//! is corrected by it, and the [`Action`] says so. Anywhere else NaN is an error, and infinity is an error everywhere.
 //! Whatever returns an [`Error`] has changed nothing.
 //!
 //! # Snapshots

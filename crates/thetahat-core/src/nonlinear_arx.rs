@@ -60,13 +60,13 @@ impl<T: Real> Scaling<T> {
 /// ```
 ///
 /// with o and s the offset and the scale of the output, and f_j the functions of a [`Basis`]. It is what a report of
-/// `thetahat fit --narx` holds: parameters of its report predict the same bits here. [`RecursiveNarx`](crate::RecursiveNarx)
-/// estimates them as samples arrive.
+/// `thetahat fit --narx` holds: parameters of its report predict the same bits here.
+/// [`RecursiveNarx`](crate::RecursiveNarx) estimates them as samples arrive.
 ///
 /// # Sizes
 ///
-/// `Z` is the number of regressors, na and all nb, and `D` the buffer for inputs on their way, as for [`Lags`]. Memory: 3 Z + D + 2
-/// numbers and 6 Z bytes, and the basis. There are at most `Z` inputs.
+/// `Z` is the number of regressors, na and all nb, and `D` the buffer for inputs on their way, as for [`Lags`]. Memory:
+/// 3 Z + D + 2 numbers and 6 Z bytes, and the basis. There are at most `Z` inputs.
 ///
 /// Source: Ljung, System Identification, 2nd ed., section 5.4.
 ///
@@ -106,8 +106,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
     ///
     /// `orders` say which lags z is made of; `inputs` has one scaling for each input.
     ///
-    /// Errors: those of [`Lags::new`] and of [`Basis::check`]; [`Error::Length`] if there is not one scaling for each input, or more
-    /// inputs than regressors; [`Error::NotFinite`] and [`Error::OutOfRange`] for an offset or a scale.
+    /// Errors: those of [`Lags::new`] and of [`Basis::check`]; [`Error::Length`] if there is not one scaling for each
+    /// input, or more inputs than regressors; [`Error::NotFinite`] and [`Error::OutOfRange`] for an offset or a scale.
     pub fn new(
         basis: B,
         orders: &ArxOrders<'_>,
@@ -127,7 +127,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
         Ok(NonlinearArx { basis, output, inputs: own, lags })
     }
 
-    /// y(k) arrives, and time goes on to k. See [`RecursiveArx::measured`](crate::RecursiveArx::measured), whose errors it has.
+    /// y(k) arrives, and time goes on to k. See [`RecursiveArx::measured`](crate::RecursiveArx::measured), whose errors
+    /// it has.
     pub fn measured(&mut self, output: T) -> Result<(), Error> {
         self.lags.check_delays()?;
         self.check_samples(&[], output)?;
@@ -135,8 +136,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
         Ok(())
     }
 
-    /// u(k): what acts from now on, until the next measurement. See [`RecursiveArx::applied`](crate::RecursiveArx::applied),
-    /// whose errors it has.
+    /// u(k): what acts from now on, until the next measurement. See
+    /// [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
         self.lags.check_inputs(inputs)?;
         self.check_samples(inputs, T::NAN)?;
@@ -196,17 +197,18 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
         learned
     }
 
-    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, with predicted outputs in the place of measured ones: a free
-    /// run from the samples so far. Which input comes first is as for [`RecursiveArx::predict`](crate::RecursiveArx::predict),
-    /// whose errors it has, and [`Error::Length`] if there is not one parameter for each function.
+    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, with predicted outputs in the place of
+    /// measured ones: a free run from the samples so far. Which input comes first is as for
+    /// [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose errors it has, and [`Error::Length`] if there is
+    /// not one parameter for each function.
     ///
     /// The state does not change. With `Dyn` the delay lines are cloned.
     pub fn predict(&self, parameters: &[T], future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
         self.predict_in(&mut self.lags.clone(), parameters, future_inputs, outputs)
     }
 
-    /// The same as [`predict`](NonlinearArx::predict) in delay lines of the caller, such as a clone of [`lags`](NonlinearArx::lags),
-    /// whose samples are lost: with `Dyn` it does not allocate.
+    /// The same as [`predict`](NonlinearArx::predict) in delay lines of the caller, such as a clone of
+    /// [`lags`](NonlinearArx::lags), whose samples are lost: with `Dyn` it does not allocate.
     ///
     /// Errors: those of `predict`; [`Error::Length`] (only with `Dyn`) if the lines have another size.
     pub fn predict_in(
@@ -250,7 +252,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
     ///
     /// With `Dyn` it allocates z.
     ///
-    /// Errors: [`Error::Length`] if there is not one regressor for each element of z, or not one parameter for each function.
+    /// Errors: [`Error::Length`] if there is not one regressor for each element of z, or not one parameter for each
+    /// function.
     pub fn output_at(&self, parameters: &[T], regressors: &[T]) -> Result<T, Error> {
         let z = self.point(parameters, regressors)?;
         Ok(self.output.undo(self.basis.value(parameters, z.as_slice())))
@@ -260,8 +263,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, D: Dimension> NonlinearArx<T, B, Z, D> 
     ///
     /// With `Dyn` it allocates z.
     ///
-    /// Errors, after which `slopes` is as it was: those of [`output_at`](NonlinearArx::output_at); [`Error::Length`] if there is not one
-    /// slope for each regressor.
+    /// Errors, after which `slopes` is as it was: those of [`output_at`](NonlinearArx::output_at); [`Error::Length`] if
+    /// there is not one slope for each regressor.
     pub fn slopes_at(&self, parameters: &[T], regressors: &[T], slopes: &mut [T]) -> Result<(), Error> {
         check_length("slopes", self.lags.size().value(), slopes.len())?;
         let z = self.point(parameters, regressors)?;

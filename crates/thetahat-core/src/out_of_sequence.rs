@@ -30,8 +30,8 @@ pub struct FilterHistory {
 }
 
 impl FilterHistory {
-    /// How many numbers are kept: of each sample n (n + 3)/2 + 1 for the filter before it was corrected, the measurement and the
-    /// input.
+    /// How many numbers are kept: of each sample n (n + 3)/2 + 1 for the filter before it was corrected, the
+    /// measurement and the input.
     pub const fn numbers(&self) -> usize {
         self.samples.saturating_add(1).saturating_mul(self.each())
     }
@@ -44,34 +44,37 @@ impl FilterHistory {
 
 /// A Kalman filter, extended or not, that takes a measurement of some samples ago.
 ///
-/// An analysis in a laboratory, a camera, a sensor behind a slow bus: what they tell is of an earlier sample, while other sensors
-/// have corrected the filter since. It keeps the last samples in a ring: the filter before it was corrected, the input
-/// and the measurement, of which elements may still be missing. A late element is put in its place, and the filter runs again from
-/// there:
+/// An analysis in a laboratory, a camera, a sensor behind a slow bus: what they tell is of an earlier sample, while
+/// other sensors have corrected the filter since. It keeps the last samples in a ring: the filter before it was
+/// corrected, the input and the measurement, of which elements may still be missing. A late element is put in its
+/// place, and the filter runs again from there:
 ///
 /// ```text
 /// x̂(j), P(j) from the ring,     j = k - age
 /// correct by y(j);   predict with u(j);   …;   correct by y(k)
 /// ```
 ///
-/// These are the steps that the filter would have taken if the measurement had come in time: the result is the same to the bit,
-/// gate and all. The models are arguments, as in [`KalmanFilter`](crate::KalmanFilter) and [`ExtendedKalmanFilter`]; for a late measurement
-/// they must be those of all the samples since. One observation has the elements of all sensors; what is not there, or not yet,
-/// is NaN.
+/// These are the steps that the filter would have taken if the measurement had come in time: the result is the same to
+/// the bit, gate and all. The models are arguments, as in [`KalmanFilter`](crate::KalmanFilter) and
+/// [`ExtendedKalmanFilter`]; for a late measurement they must be those of all the samples since. One observation has
+/// the elements of all sensors; what is not there, or not yet, is NaN.
 ///
-/// The other exact way, to make past states a part of the state, takes n (d + 1) states for a delay of d samples, and about
-/// 1.2 n³ (d + 1)³ multiply-adds in every sample: for two states and d = 4 some 125 times those of the filter. Here a sample
-/// costs a copy of n (n + 3)/2 numbers more than without, and a late measurement as much as the d + 1 samples that run
-/// again. Rules that correct by the late element at once, that of Larsen and others for instance, cost less then, and
-/// are exact only where nothing else has corrected the filter meanwhile, or with a gain that follows all that did.
+/// The other exact way, to make past states a part of the state, takes n (d + 1) states for a delay of d samples, and
+/// about 1.2 n³ (d + 1)³ multiply-adds in every sample: for two states and d = 4 some 125 times those of the filter.
+/// Here a sample costs a copy of n (n + 3)/2 numbers more than without, and a late measurement as much as the d + 1
+/// samples that run again. Rules that correct by the late element at once, that of Larsen and others for instance, cost
+/// less then, and are exact only where nothing else has corrected the filter meanwhile, or with a gain that follows all
+/// that did.
 ///
 /// # Sizes
 ///
-/// `B` is the buffer of the ring, at least [`FilterHistory::numbers`]. Memory: that, the filter's own, and some counters. A late
-/// measurement takes as much again on the stack: it works on a copy, so that an error leaves all as it was.
+/// `B` is the buffer of the ring, at least [`FilterHistory::numbers`]. Memory: that, the filter's own, and some
+/// counters. A late measurement takes as much again on the stack: it works on a copy, so that an error leaves all as it
+/// was.
 ///
-/// Source: Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998 (ways
-/// and their costs); Bar-Shalom, Update with out-of-sequence measurements in tracking: exact solution, 2002.
+/// Source: Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman
+/// filter, 1998 (ways and their costs); Bar-Shalom, Update with out-of-sequence measurements in tracking: exact
+/// solution, 2002.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Matrix1, SVector, Vector1, Vector2};
@@ -107,8 +110,8 @@ impl FilterHistory {
 #[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, M, U, B>"))]
 pub struct OutOfSequenceFilter<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> {
     filter: ExtendedKalmanFilter<T, N>,
-    /// The samples of the ring one after the other: of each the filter before it was corrected, the measurement and the input, NaN
-    /// where there is none yet.
+    /// The samples of the ring one after the other: of each the filter before it was corrected, the measurement and the
+    /// input, NaN where there is none yet.
     ring: OVector<T, B>,
     outputs: M,
     inputs: U,
@@ -120,12 +123,13 @@ pub struct OutOfSequenceFilter<T: Real, N: Dimension, M: Dimension, U: Dimension
 }
 
 impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSequenceFilter<T, N, M, U, B> {
-    /// Around a filter as it is before its first measurement ([`KalmanFilter`](crate::KalmanFilter) becomes one by `into`), for
-    /// measurements that are at most `samples` late.
+    /// Around a filter as it is before its first measurement ([`KalmanFilter`](crate::KalmanFilter) becomes one by
+    /// `into`), for measurements that are at most `samples` late.
     ///
     /// `outputs` and `inputs` are their numbers: `Const`, or `Dyn(2)` with the feature `alloc`.
     ///
-    /// Errors: [`Error::OutOfRange`] if `samples` is 0, or a number does not fit; [`Error::Length`] if `B` is too small.
+    /// Errors: [`Error::OutOfRange`] if `samples` is 0, or a number does not fit; [`Error::Length`] if `B` is too
+    /// small.
     pub fn new(
         filter: impl Into<ExtendedKalmanFilter<T, N>>,
         outputs: M,
@@ -150,8 +154,8 @@ impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSeque
         Ok(this)
     }
 
-    /// The measurement update of now, with y(k) and u(k): see [`ExtendedKalmanFilter::correct`], whose errors it has. NaN is an
-    /// element that is missing, or that will come late. It may be called again for others of the same sample.
+    /// The measurement update of now, with y(k) and u(k): see [`ExtendedKalmanFilter::correct`], whose errors it has.
+    /// NaN is an element that is missing, or that will come late. It may be called again for others of the same sample.
     ///
     /// Errors, after which nothing has changed: also [`Error::OutOfRange`] if an element has come before.
     pub fn correct(
@@ -175,8 +179,8 @@ impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSeque
         Ok(innovation)
     }
 
-    /// The time update: one sample ahead, with the input u(k), the one that [`correct`](OutOfSequenceFilter::correct) had. See
-    /// [`ExtendedKalmanFilter::predict`], whose errors it has.
+    /// The time update: one sample ahead, with the input u(k), the one that [`correct`](OutOfSequenceFilter::correct)
+    /// had. See [`ExtendedKalmanFilter::predict`], whose errors it has.
     pub fn predict(
         &mut self,
         transition: &impl Transition<T, N, U>,
@@ -193,13 +197,14 @@ impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSeque
 
     /// A measurement of `age` samples ago: the elements of y(k - age) that had not come yet; the others are NaN.
     ///
-    /// The innovation is that of all elements of that sample, as [`correct`](OutOfSequenceFilter::correct) would have given it then. If
-    /// all are NaN, nothing changes.
+    /// The innovation is that of all elements of that sample, as [`correct`](OutOfSequenceFilter::correct) would have
+    /// given it then. If all are NaN, nothing changes.
     ///
-    /// Errors, after which nothing has changed: [`Error::OutOfRange`] if `age` is not 1 … [`kept`](OutOfSequenceFilter::kept): it is too late, or
-    /// of a time before the first sample (a measurement of now is for `correct`, and there is none of the future); also if
-    /// an element has come before; and those of [`ExtendedKalmanFilter::correct`] and [`predict`](ExtendedKalmanFilter::predict).
-    /// `age` + 1 corrections and `age` predictions.
+    /// Errors, after which nothing has changed: [`Error::OutOfRange`] if `age` is not 1 …
+    /// [`kept`](OutOfSequenceFilter::kept): it is too late, or of a time before the first sample (a measurement of now
+    /// is for `correct`, and there is none of the future); also if an element has come before; and those of
+    /// [`ExtendedKalmanFilter::correct`] and [`predict`](ExtendedKalmanFilter::predict). `age` + 1 corrections and
+    /// `age` predictions.
     pub fn correct_late(
         &mut self,
         transition: &impl Transition<T, N, U>,
@@ -250,11 +255,12 @@ impl<T: Real, N: Dimension, M: Dimension, U: Dimension, B: Dimension> OutOfSeque
         self.filter.correct(observation, &input, &measurement)
     }
 
-    /// Changes the filter of now, by [`set_state`](ExtendedKalmanFilter::set_state), [`widen`](ExtendedKalmanFilter::widen) and the
-    /// like. What is kept of the past ends here: measurements of samples before are too late, as they would undo the change.
+    /// Changes the filter of now, by [`set_state`](ExtendedKalmanFilter::set_state),
+    /// [`widen`](ExtendedKalmanFilter::widen) and the like. What is kept of the past ends here: measurements of samples
+    /// before are too late, as they would undo the change.
     ///
-    /// Errors, after which nothing has changed: what `change` answers; [`Error::Length`] (only with `Dyn`) if it leaves a filter of
-    /// another size.
+    /// Errors, after which nothing has changed: what `change` answers; [`Error::Length`] (only with `Dyn`) if it leaves
+    /// a filter of another size.
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Vector1};

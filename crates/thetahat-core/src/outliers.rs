@@ -9,17 +9,18 @@ use crate::{Action, Error, Real};
 /// normalised innovation squared ([`nis`](crate::Innovation::nis)) tells it from others: for Gaussian noise it is above
 /// 9 in 0.3 % of the samples, above 16 in 0.006 %.
 ///
-/// A spike would also stand in the regressors of the next samples. So the delay lines of past outputs (of ARX, ARMAX and nonlinear
-/// ARX models) take of the first outlier in a row the prediction plus the part of the innovation that was used (Martin and Thomson,
-/// Robust-resistant spectrum estimation, 1982). An outlier right after it tells that the plant has moved: it is taken as it was
-/// measured. (On ten public logs of plants that are not all linear, to clean all of a row made the errors of a step ahead up to
-/// eight times as large.)
+/// A spike would also stand in the regressors of the next samples. So the delay lines of past outputs (of ARX, ARMAX
+/// and nonlinear ARX models) take of the first outlier in a row the prediction plus the part of the innovation that was
+/// used (Martin and Thomson, Robust-resistant spectrum estimation, 1982). An outlier right after it tells that the
+/// plant has moved: it is taken as it was measured. (On ten public logs of plants that are not all linear, to clean all
+/// of a row made the errors of a step ahead up to eight times as large.)
 ///
-/// What an outlier tells of the noise variance is bounded by the threshold, twice as much of it with each in a row: so a noise that
-/// has grown is learnt within a few samples, even from none, and nothing is locked out for ever.
+/// What an outlier tells of the noise variance is bounded by the threshold, twice as much of it with each in a row: so
+/// a noise that has grown is learnt within a few samples, even from none, and nothing is locked out for ever.
 ///
-/// What it costs and brings: the root mean square error of b_0 = 1 of ARX(1, 1), forgetting by 0.99, Gaussian noise, over 100 runs;
-/// with one sample in 100 a spike of 30 deviations; and after how many samples half of a change of b_0 to 2 is learnt:
+/// What it costs and brings: the root mean square error of b_0 = 1 of ARX(1, 1), forgetting by 0.99, Gaussian noise,
+/// over 100 runs; with one sample in 100 a spike of 30 deviations; and after how many samples half of a change of b_0
+/// to 2 is learnt:
 ///
 /// | | no outliers | spikes | half of a change |
 /// |---|---|---|---|
@@ -28,9 +29,10 @@ use crate::{Action, Error, Real};
 /// | `Gate`, 25, 20 | 0.0144 | 0.0145 | 71.5 |
 /// | `Gate`, 16, 5 | 0.0144 | 0.0145 | 74.7 |
 ///
-/// (Printed by `cargo test -p thetahat-core --lib outliers::tests::table -- --nocapture`.) It is off unless it is asked for: on
-/// logs without spikes, of plants that are not linear, the errors of a step ahead are up to a third larger with it (ten public logs:
-/// 7 % on average; with a spike in one sample of 100 they are a fifth, the median), and without it the estimate is that of least squares.
+/// (Printed by `cargo test -p thetahat-core --lib outliers::tests::table -- --nocapture`.) It is off unless it is asked
+/// for: on logs without spikes, of plants that are not linear, the errors of a step ahead are up to a third larger with
+/// it (ten public logs: 7 % on average; with a spike in one sample of 100 they are a fifth, the median), and without it
+/// the estimate is that of least squares.
 ///
 /// It begins once the noise variance is known, and the [start](crate::RlsStart) is over.
 ///

@@ -16,10 +16,10 @@ use crate::{
 
 /// What a [`RecursiveOutputError`] corrects by, and along which direction.
 ///
-/// Both find the plant without bias where an ARX model does not. The distance of f_1 from the truth, -0.9, in the mean of 200
-/// runs, and its deviation, for the plant y(k) = 0.9 y(k-1) + 0.08 u(k-1) in an open loop, u a random ±1 and noise of the
-/// sensor of half the deviation of y, after 5,000 samples without forgetting; white noise, then noise that a pole at 0.5
-/// has coloured:
+/// Both find the plant without bias where an ARX model does not. The distance of f_1 from the truth, -0.9, in the mean
+/// of 200 runs, and its deviation, for the plant y(k) = 0.9 y(k-1) + 0.08 u(k-1) in an open loop, u a random ±1 and
+/// noise of the sensor of half the deviation of y, after 5,000 samples without forgetting; white noise, then noise that
+/// a pole at 0.5 has coloured:
 ///
 /// | | white | deviation | coloured | deviation |
 /// |---|---|---|---|---|
@@ -44,9 +44,9 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum OutputErrorMethod {
-    /// ψ = φ/F(q), the gradient of the model's output, and e = y - φ'θ̂, the output error: converges to a minimum of its
-    /// variance. The estimate with the least variance where the noise is white, with honest standard errors then. nf n
-    /// multiply-adds and moves more.
+    /// ψ = φ/F(q), the gradient of the model's output, and e = y - φ'θ̂, the output error: converges to a minimum of
+    /// its variance. The estimate with the least variance where the noise is white, with honest standard errors then.
+    /// nf n multiply-adds and moves more.
     PredictionError,
     /// Instrumental variables: ψ = φ, which holds the output of the model and none of the noise, and the equation error
     ///
@@ -54,10 +54,10 @@ pub enum OutputErrorMethod {
     /// e = y(k) + f_1 y(k-1) + … + f_nf y(k-nf) - Σ B_i(q) u_i(k) - constant
     /// ```
     ///
-    /// of what was measured. It is linear in the parameters, so that there is no minimum but the one, whatever the colour
-    /// of the noise of the sensor; and it needs nf measurements in a row before it learns again. The equation error is not
-    /// white even where the noise of the sensor is. So the variance of the noise, standard errors and `nis` are not known, and there is no
-    /// rule for [outliers](crate::Outliers).
+    /// of what was measured. It is linear in the parameters, so that there is no minimum but the one, whatever the
+    /// colour of the noise of the sensor; and it needs nf measurements in a row before it learns again. The equation
+    /// error is not white even where the noise of the sensor is. So the variance of the noise, standard errors and
+    /// `nis` are not known, and there is no rule for [outliers](crate::Outliers).
     ///
     /// P is the symmetric one of the instruments, and its factors stay positive in single precision. (The other one,
     /// (Σ ψ φ')⁻¹, has no factors and may become singular. With both sides filtered by 1/F(q), the refined instrumental
@@ -72,8 +72,9 @@ pub enum OutputErrorMethod {
 /// F(q) = 1 + f_1 q⁻¹ + … + f_nf q⁻ⁿᶠ
 /// ```
 ///
-/// with B as in [`RecursiveArx`](crate::RecursiveArx), one F for all inputs, and a disturbance e that does not go through the plant: noise of the
-/// sensor, white or coloured, which biases an ARX model. The regressor holds the model's own output in the place of what was measured,
+/// with B as in [`RecursiveArx`](crate::RecursiveArx), one F for all inputs, and a disturbance e that does not go
+/// through the plant: noise of the sensor, white or coloured, which biases an ARX model. The regressor holds the
+/// model's own output in the place of what was measured,
 ///
 /// ```text
 /// φ(k) = [ -x̂(k-1) … -x̂(k-nf)   u_1(k-nk_1) …   1 ]'
@@ -84,24 +85,27 @@ pub enum OutputErrorMethod {
 /// x̂(k) = φ'θ̂                                         with the new θ̂
 /// ```
 ///
-/// or the ψ and e of [`OutputErrorMethod::Instruments`]. Everything said of forgetting and bounds at [`RecursiveLeastSquares`] holds
-/// here; the start is the standard one. The [`ArxOrders`] are those of an ARX model, with nf as `na`.
+/// or the ψ and e of [`OutputErrorMethod::Instruments`]. Everything said of forgetting and bounds at
+/// [`RecursiveLeastSquares`] holds here; the start is the standard one. The [`ArxOrders`] are those of an ARX model,
+/// with nf as `na`.
 ///
-/// The input must be independent of the noise: in a closed loop both methods are biased, and a plant that is not stable has no
-/// such model. F stays stable, as C of [`RecursiveArmax`](crate::RecursiveArmax) does, and [`Action::Projected`] tells.
+/// The input must be independent of the noise: in a closed loop both methods are biased, and a plant that is not stable
+/// has no such model. F stays stable, as C of [`RecursiveArmax`](crate::RecursiveArmax) does, and [`Action::Projected`]
+/// tells.
 ///
-/// Time is the order of the calls, and a missing sample is NaN, as in [`RecursiveArx`](crate::RecursiveArx#time). A missing
-/// measurement corrects nothing, and the model's output goes on. While the lines are not filled, at the start and after missing inputs,
-/// measurements stand in for the model's output, and their errors die away as 1/F(q) does.
+/// Time is the order of the calls, and a missing sample is NaN, as in [`RecursiveArx`](crate::RecursiveArx#time). A
+/// missing measurement corrects nothing, and the model's output goes on. While the lines are not filled, at the start
+/// and after missing inputs, measurements stand in for the model's output, and their errors die away as 1/F(q) does.
 ///
 /// # Sizes
 ///
 /// `N` is the number of parameters, [`ArxOrders::parameters`], and `D` the buffer for inputs on their way, at least
 /// [`ArxOrders::delays`]. Memory: that of `RecursiveArx`, and n² numbers for past gradients.
 ///
-/// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients) and 6.6
-/// (projection); Ljung, System Identification, 2nd ed., sections 11.3 (instruments) and 11.4; Söderström and Stoica,
-/// Instrumental Variable Methods for System Identification, 1983 (instruments from an auxiliary model); Young, Recursive Estimation and Time-Series Analysis, 2nd ed., 2011, chapters 6 and 7 (the symmetric P).
+/// Source: Ljung and Söderström, Theory and Practice of Recursive Identification, 1983, sections 3.7.2 (gradients) and
+/// 6.6 (projection); Ljung, System Identification, 2nd ed., sections 11.3 (instruments) and 11.4; Söderström and
+/// Stoica, Instrumental Variable Methods for System Identification, 1983 (instruments from an auxiliary model); Young,
+/// Recursive Estimation and Time-Series Analysis, 2nd ed., 2011, chapters 6 and 7 (the symmetric P).
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector2};
@@ -141,8 +145,8 @@ pub struct RecursiveOutputError<T: Real, N: Dimension + Dimension<Const<1>>, D: 
 }
 
 impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputError<T, N, D> {
-    /// An estimator that knows nothing yet, and has seen no sample. As [`RecursiveArx::new`](crate::RecursiveArx::new), whose
-    /// scales and errors it has; `na` of the orders is nf.
+    /// An estimator that knows nothing yet, and has seen no sample. As [`RecursiveArx::new`](crate::RecursiveArx::new),
+    /// whose scales and errors it has; `na` of the orders is nf.
     pub fn new(
         orders: &ArxOrders<'_>,
         method: OutputErrorMethod,
@@ -160,8 +164,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         Ok(this)
     }
 
-    /// The same as [`new`](RecursiveOutputError::new) for orders that are constants, so that wrong sizes do not compile: see
-    /// [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
+    /// The same as [`new`](RecursiveOutputError::new) for orders that are constants, so that wrong sizes do not
+    /// compile: see [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
     pub fn of<O: ConstantOrders>(
         method: OutputErrorMethod,
         output_scale: T,
@@ -184,8 +188,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         is_stable(f).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
     }
 
-    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has. The error that is compared with
-    /// it is that of the method.
+    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has. The error that is
+    /// compared with it is that of the method.
     pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
         self.set_dead_zone(width)?;
         Ok(self)
@@ -196,8 +200,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     ///
     /// The innovation is y(k) less the model's output, with both methods; the actions are those of
     /// [`RecursiveArmax::measured`](crate::RecursiveArmax::measured), with F in the place of C. With
-    /// [`Instruments`](OutputErrorMethod::Instruments) it is [`NotReady`](Action::NotReady) too while one of the last nf
-    /// measurements is missing, and the variance is NaN.
+    /// [`Instruments`](OutputErrorMethod::Instruments) it is [`NotReady`](Action::NotReady) too while one of the last
+    /// nf measurements is missing, and the variance is NaN.
     ///
     /// Errors, after which nothing has changed, time included: as for
     /// [`RecursiveArx::measured`](crate::RecursiveArx::measured).
@@ -209,8 +213,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         Ok(self.step(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a missing
-    /// sample.
+    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a
+    /// missing sample.
     ///
     /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
@@ -226,8 +230,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
 
     /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
     ///
-    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller that
-    /// knows u(k-1) when y(k) arrives.
+    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
+    /// that knows u(k-1) when y(k) arrives.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.lags.check_inputs(inputs)?;
         check_samples(inputs, &[output], self.past.ncols())?;
@@ -261,7 +265,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         )
     }
 
-    /// Learns from y(k), if φ(k) is there; returns the innovation and x̂(k), or `None` where numbers are missing or too large.
+    /// Learns from y(k), if φ(k) is there; returns the innovation and x̂(k), or `None` where numbers are missing or too
+    /// large.
     fn learn(&mut self, output: T) -> Option<(Innovation<T>, T)> {
         let RecursiveOutputError { lags, estimator, past, nf, method, scratch } = self;
         let (size, nf) = (past.shape_generic().0, *nf);
@@ -345,8 +350,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     }
 
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
-    /// [`RecursiveLeastSquares::keep_within`], whose errors it has. Where the nearest point has no stable F, each parameter
-    /// is cut off by itself, and F stays as it is if that does not help.
+    /// [`RecursiveLeastSquares::keep_within`], whose errors it has. Where the nearest point has no stable F, each
+    /// parameter is cut off by itself, and F stays as it is if that does not help.
     pub fn keep_within(&mut self, limits: &[RangeInclusive<T>]) -> Result<bool, Error> {
         let RecursiveOutputError { estimator, past, nf, scratch, .. } = self;
         let size = past.shape_generic().0;

@@ -17,18 +17,18 @@ use crate::{
 /// z(k) = [ y(k-1) … y(k-na)   u1(k-nk1) … u1(k-nk1-nb1+1)   u2(k-nk2) … ]', each as (x - offset)/scale
 /// ```
 ///
-/// It is [`RecursiveLeastSquares`] on the functions of a [`Basis`] of z, and linear in θ: all that is said there of forgetting, starts
-/// and bounds holds here, and [`RecursiveArx`](crate::RecursiveArx) says in which order [`measured`](RecursiveNarx::measured) and
-/// [`applied`](RecursiveNarx::applied) are called. Signals are scaled to about 1 first, so that one prior serves all functions, and
-/// single precision is enough.
+/// It is [`RecursiveLeastSquares`] on the functions of a [`Basis`] of z, and linear in θ: all that is said there of
+/// forgetting, starts and bounds holds here, and [`RecursiveArx`](crate::RecursiveArx) says in which order
+/// [`measured`](RecursiveNarx::measured) and [`applied`](RecursiveNarx::applied) are called. Signals are scaled to
+/// about 1 first, so that one prior serves all functions, and single precision is enough.
 ///
-/// Terms come from a batch choice (`thetahat fit --narx`), whose parameters are these to the unit; or are all products up to
-/// a degree, where there are few. More terms than the plant tells apart stay bounded, and are of no use.
+/// Terms come from a batch choice (`thetahat fit --narx`), whose parameters are these to the unit; or are all products
+/// up to a degree, where there are few. More terms than the plant tells apart stay bounded, and are of no use.
 ///
 /// # Sizes
 ///
-/// `Z` is the number of regressors, `N` that of functions, and `D` the buffer for inputs on their way, as for [`Lags`]. Memory: that of
-/// [`NonlinearArx`] and of [`RecursiveLeastSquares`], and N numbers.
+/// `Z` is the number of regressors, `N` that of functions, and `D` the buffer for inputs on their way, as for [`Lags`].
+/// Memory: that of [`NonlinearArx`] and of [`RecursiveLeastSquares`], and N numbers.
 ///
 /// Source: Ljung, System Identification, 2nd ed., sections 5.4 and 11.2.
 ///
@@ -87,7 +87,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
 {
     /// An estimator that knows nothing yet, and has seen no sample.
     ///
-    /// Errors: those of [`NonlinearArx::new`] and of [`RecursiveLeastSquares::new`]; [`Error::Length`] if there are not `N` functions.
+    /// Errors: those of [`NonlinearArx::new`] and of [`RecursiveLeastSquares::new`]; [`Error::Length`] if there are not
+    /// `N` functions.
     pub fn new(
         basis: B,
         orders: &ArxOrders<'_>,
@@ -113,8 +114,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         Ok(RecursiveNarx { estimator: self.estimator.with_start(start)?, ..self })
     }
 
-    /// The same started from a batch solution on the functions. See [`RecursiveLeastSquares::with_solution`], whose errors it
-    /// has.
+    /// The same started from a batch solution on the functions. See [`RecursiveLeastSquares::with_solution`], whose
+    /// errors it has.
     pub fn with_solution(self, solution: &Solution<T, N>) -> Result<Self, Error> {
         Ok(RecursiveNarx { estimator: self.estimator.with_solution(solution)?, ..self })
     }
@@ -126,14 +127,15 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         Ok(self)
     }
 
-    /// The same with a dead zone, in the unit of the output. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
+    /// The same with a dead zone, in the unit of the output. See [`RecursiveLeastSquares::with_dead_zone`], whose
+    /// errors it has.
     pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
         self.set_dead_zone(width)?;
         Ok(self)
     }
 
-    /// y(k) arrives: time goes on to k, and the model learns. See [`RecursiveArx::measured`](crate::RecursiveArx::measured),
-    /// whose errors it has.
+    /// y(k) arrives: time goes on to k, and the model learns. See
+    /// [`RecursiveArx::measured`](crate::RecursiveArx::measured), whose errors it has.
     ///
     /// The innovation is in units of the output. Beside the functions 1.5 n² + 7 n multiply-adds and n divisions.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
@@ -142,8 +144,8 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         Ok(self.step(&[], output, true))
     }
 
-    /// u(k): what acts on the plant from now on. See [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it
-    /// has.
+    /// u(k): what acts on the plant from now on. See [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose
+    /// errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
         let missing = !self.model.lags.awaits_inputs();
         self.model.applied(inputs)?;
@@ -219,13 +221,15 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         self.estimator.set_parameters(parameters)
     }
 
-    /// Sets the noise variance, in squared units of the output: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
+    /// Sets the noise variance, in squared units of the output: see [`RecursiveLeastSquares::set_noise_variance`],
+    /// whose errors it has.
     pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
         let scale = self.model.output.scale;
         self.estimator.set_noise_variance(variance / (scale * scale), samples)
     }
 
-    /// Sets the dead zone, in the unit of the output: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
+    /// Sets the dead zone, in the unit of the output: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it
+    /// has.
     pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
         self.estimator.set_dead_zone(width / self.model.output.scale)
     }

@@ -39,9 +39,9 @@ pub(crate) use settings::pass_on_settings;
 /// the others, what each is for, and how each stays bounded. [`RlsStart`] lists the ways to start.
 ///
 /// P = U D U' is kept as its factors and updated by formulas that do not subtract variances: it never becomes
-/// indefinite, in `f32` too. And it is bounded, so that neither silence nor a held input makes the estimate
-/// useless: nothing is forgotten [where it is at its bound](Forgetting#the-bound). (Measured with λ = 0.99 and a silent input: without the bound P was lost after 59,000 steps in `f32`
-/// and after 121,000 in `f64`, factored as it was.)
+/// indefinite, in `f32` too. And it is bounded, so that neither silence nor a held input makes the estimate useless:
+/// nothing is forgotten [where it is at its bound](Forgetting#the-bound). (Measured with λ = 0.99 and a silent input:
+/// without the bound P was lost after 59,000 steps in `f32` and after 121,000 in `f64`, factored as it was.)
 ///
 /// # Scales
 ///
@@ -67,10 +67,10 @@ pub(crate) use settings::pass_on_settings;
 /// selective forgetting λ is the `factor`; the random walk does not forget residuals, and its P is the covariance,
 /// cov θ̂ = σ̂² P.
 ///
-/// In the directions in which nothing is forgotten, as they are [at their bound](Forgetting#the-bound) or silent, the noise
-/// variance of cov θ̂ is the largest since that began, and at the bound W₂/W is 1 there: a loop that has settled, with
-/// samples that agree to the last digit, says nothing of what it does not excite. What the prior does not allow for shows
-/// nowhere: of a plant without noise that never was excited, errors can be some ten standard errors.
+/// In the directions in which nothing is forgotten, as they are [at their bound](Forgetting#the-bound) or silent, the
+/// noise variance of cov θ̂ is the largest since that began, and at the bound W₂/W is 1 there: a loop that has settled,
+/// with samples that agree to the last digit, says nothing of what it does not excite. What the prior does not allow
+/// for shows nowhere: of a plant without noise that never was excited, errors can be some ten standard errors.
 ///
 /// # Several outputs
 ///
@@ -81,8 +81,8 @@ pub(crate) use settings::pass_on_settings;
 ///
 /// θ_j has the unit of y over that of φ_j. P_ij has one over the units of φ_i and φ_j.
 ///
-/// Memory: n² + n (2 m + 1) + m + 7 numbers, n flags and a few counters: 164 bytes for n = 4 in `f32` on a 32-bit machine.
-/// An update costs 1.5 n² + (6 + m) n multiply-adds and n divisions. No square root.
+/// Memory: n² + n (2 m + 1) + m + 7 numbers, n flags and a few counters: 164 bytes for n = 4 in `f32` on a 32-bit
+/// machine. An update costs 1.5 n² + (6 + m) n multiply-adds and n divisions. No square root.
 ///
 /// Source: Ljung, System Identification, 2nd ed., section 11.2; Bierman, Factorization Methods for Discrete
 /// Sequential Estimation, 1977, chapter V (the factors).
@@ -404,7 +404,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// The same with this P, n x n, to start from, in units of the noise variance: how sure the parameters of
-    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`RlsStart::Standard`], as there.
+    /// [`with_parameters`](RecursiveLeastSquares::with_parameters) are. The start is then [`RlsStart::Standard`], as
+    /// there.
     ///
     /// A variance of 0 holds a parameter at its value, with every policy. One above the bound does not grow.
     ///
@@ -416,8 +417,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
     }
 
     /// The same with a dead zone: an innovation of at most this size, in the unit of y, corrects nothing, and makes
-    /// nothing forgotten; [`Action::Skipped`](crate::Action::Skipped) tells. With several outputs all must be that small. The noise
-    /// variance still counts them.
+    /// nothing forgotten; [`Action::Skipped`](crate::Action::Skipped) tells. With several outputs all must be that
+    /// small. The noise variance still counts them.
     ///
     /// For noise that is bounded rather than white, such as that of a coarse converter. 0 is no dead zone.
     ///
@@ -442,8 +443,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         self.outliers.rule()
     }
 
-    /// How many of the latest samples were outliers, since the last one that was none, at most 65,535; missing ones do not
-    /// count. More than a few: what is taken for outliers is a change of the plant or of the noise.
+    /// How many of the latest samples were outliers, since the last one that was none, at most 65,535; missing ones do
+    /// not count. More than a few: what is taken for outliers is a change of the plant or of the noise.
     pub fn outliers_in_a_row(&self) -> u16 {
         self.outliers.in_a_row
     }

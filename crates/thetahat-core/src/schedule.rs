@@ -180,8 +180,8 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
 
     /// The same, given up where `interrupted`, which is asked before each step, says so.
     ///
-    /// Errors: those of [`steady_state`](GainSchedule::steady_state); [`Error::NotConverged`] with the steps done where it
-    /// was given up.
+    /// Errors: those of [`steady_state`](GainSchedule::steady_state); [`Error::NotConverged`] with the steps done where
+    /// it was given up.
     pub fn steady_state_unless<M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>(
         mut self,
         transition: &LinearTransition<T, N, U>,

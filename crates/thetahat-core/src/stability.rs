@@ -38,9 +38,9 @@ pub(crate) fn is_stable<T: Real>(mut c: &mut [T]) -> bool {
     true
 }
 
-/// Adds `step` times `direction` to the parameters, or half of it, a quarter, …, so that the polynomial among them stays
-/// stable; nothing if that does not help. `work` has at least the size of the polynomial. Returns whether the step was
-/// shortened.
+/// Adds `step` times `direction` to the parameters, or half of it, a quarter, …, so that the polynomial among them
+/// stays stable; nothing if that does not help. `work` has at least the size of the polynomial. Returns whether the
+/// step was shortened.
 #[inline(always)]
 pub(crate) fn move_stably<T: Real>(
     parameters: &mut [T],

@@ -202,8 +202,8 @@ impl<T: Real> Value<T> for Sum<T> {
     }
 }
 
-/// The least share of a column's norm that is left once the columns before it are projected out: |r_jj| over the norm of
-/// column j. 0 where a column is 0.
+/// The least share of a column's norm that is left once the columns before it are projected out: |r_jj| over the norm
+/// of column j. 0 where a column is 0.
 pub(crate) fn least_remainder<T: Real, E: Value<T>>(triangle: &[E], size: usize) -> T {
     (0..size).fold(T::one(), |least, index| {
         let column = (0..=index).filter_map(|row| triangle.get(row * size + index));

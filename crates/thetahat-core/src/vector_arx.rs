@@ -19,12 +19,12 @@ use crate::{
 /// A(q) = I + A_1 q⁻¹ + … + A_na q⁻ⁿᵃ,     B_i(q) = q⁻ⁿᵏ (b_0 + b_1 q⁻¹ + … + b_(nb-1) q⁻ⁿᵇ⁺¹)
 /// ```
 ///
-/// with M outputs: A_1 … A_na are M x M, full, and every b_j and the constant have an entry for each output. So each output
-/// is an ARX model of its own past, that of the other outputs, and the inputs.
+/// with M outputs: A_1 … A_na are M x M, full, and every b_j and the constant have an entry for each output. So each
+/// output is an ARX model of its own past, that of the other outputs, and the inputs.
 ///
 /// It is [`RecursiveLeastSquares`] with M outputs on the regressor of [`Lags::with_outputs`], φ(k) = \[-y_1(k-1) …
-/// -y_1(k-na)  -y_2(k-1) … u(k-nk) … 1\]', which all equations share: y(k) = θ'φ(k) + e(k) with θ n x M, a column for each
-/// output, its rows in the order of φ. They share P too, so that an output more costs one product more, and not a
+/// -y_1(k-na) -y_2(k-1) … u(k-nk) … 1\]', which all equations share: y(k) = θ'φ(k) + e(k) with θ n x M, a column for
+/// each output, its rows in the order of φ. They share P too, so that an output more costs one product more, and not a
 /// factorisation. Everything said there of forgetting and starts holds here.
 ///
 /// Time is that of [`RecursiveArx`](crate::RecursiveArx#time): `measured`, then `applied`; or `log_row`. A sample of
@@ -32,8 +32,8 @@ use crate::{
 ///
 /// # Sizes
 ///
-/// `N` is the number of parameters of each equation, [`ArxOrders::parameters_of`], `M` the number of outputs, and `D` the
-/// buffer for inputs on their way, at least [`ArxOrders::delays`].
+/// `N` is the number of parameters of each equation, [`ArxOrders::parameters_of`], `M` the number of outputs, and `D`
+/// the buffer for inputs on their way, at least [`ArxOrders::delays`].
 ///
 /// Source: Ljung, System Identification, 2nd ed., sections 4.2 (equations 4.53 to 4.57) and 11.2.
 ///
@@ -77,11 +77,11 @@ pub struct RecursiveVectorArx<T: Real, N: Dimension + Dimension<M>, M: Dimension
 impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> RecursiveVectorArx<T, N, M, D> {
     /// An estimator that knows nothing yet, and has seen no sample.
     ///
-    /// `output_scales` and `input_scales` are the typical magnitudes of each output and of each input, in their own units:
-    /// what they deviate from 0 by, see [Scales](RecursiveLeastSquares#scales).
+    /// `output_scales` and `input_scales` are the typical magnitudes of each output and of each input, in their own
+    /// units: what they deviate from 0 by, see [Scales](RecursiveLeastSquares#scales).
     ///
-    /// Errors: those of [`Lags::with_outputs`] and of [`RecursiveLeastSquares::with_outputs`]; [`Error::Length`] if there
-    /// is not one scale for each input.
+    /// Errors: those of [`Lags::with_outputs`] and of [`RecursiveLeastSquares::with_outputs`]; [`Error::Length`] if
+    /// there is not one scale for each input.
     pub fn new(
         orders: &ArxOrders<'_>,
         output_scales: &OVector<T, M>,
@@ -95,8 +95,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         Ok(RecursiveVectorArx { lags, estimator })
     }
 
-    /// The same as [`new`](RecursiveVectorArx::new) for orders that are constants, so that wrong sizes do not compile: see
-    /// [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
+    /// The same as [`new`](RecursiveVectorArx::new) for orders that are constants, so that wrong sizes do not compile:
+    /// see [`RecursiveArx::of`](crate::RecursiveArx::of). The errors are those of `new` that are left.
     pub fn of<O: ConstantOrders>(
         output_scales: &OVector<T, M>,
         input_scales: &[T],
@@ -125,9 +125,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
     /// The innovation is that of [`RecursiveLeastSquares::update_all`], with the actions of
     /// [`RecursiveArx::measured`](crate::RecursiveArx::measured).
     ///
-    /// Errors, after which nothing has changed, time included: [`Error::InputFirst`] if an input acts in its own sample:
-    /// [`log_row`](RecursiveVectorArx::log_row) takes that; [`Error::Length`] (only with `Dyn`); [`Error::Infinite`];
-    /// [`Error::TooLarge`], as there.
+    /// Errors, after which nothing has changed, time included: [`Error::InputFirst`] if an input acts in its own
+    /// sample: [`log_row`](RecursiveVectorArx::log_row) takes that; [`Error::Length`] (only with `Dyn`);
+    /// [`Error::Infinite`]; [`Error::TooLarge`], as there.
     ///
     /// 1.5 n² + (6 + M) n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, outputs: &OVector<T, M>) -> Result<Innovation<T, OVector<T, M>>, Error> {
@@ -199,9 +199,9 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
     /// The outputs to come, ŷ(k+1), then ŷ(k+2), …, each with a number for every output, as many as `outputs` holds.
     ///
     /// `future_inputs` are those to come, and as many samples; which is the first follows from the latest call, as in
-    /// [`RecursiveArx::predict`](crate::RecursiveArx::predict). Predicted outputs take the place of measured ones. A sample
-    /// that depends on a missing one is NaN. The state of the estimator does not change. With `Dyn` the delay lines are
-    /// cloned. n M multiply-adds and n moves a step.
+    /// [`RecursiveArx::predict`](crate::RecursiveArx::predict). Predicted outputs take the place of measured ones. A
+    /// sample that depends on a missing one is NaN. The state of the estimator does not change. With `Dyn` the delay
+    /// lines are cloned. n M multiply-adds and n moves a step.
     ///
     /// Errors: [`Error::Length`] if there are no whole samples, or not as many inputs; [`Error::Infinite`]; both leave
     /// `outputs` as they were. [`Error::Overflow`] if an unstable model grows out of `T`: the samples before that are
@@ -248,8 +248,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         &self.lags
     }
 
-    /// A(q) in a row and a column, counted from 0: what multiplies the output of the column in the equation of that of the
-    /// row. 1 or, off the diagonal, 0; then the coefficients of q⁻¹ … q⁻ⁿᵃ. `None` if there is no such output.
+    /// A(q) in a row and a column, counted from 0: what multiplies the output of the column in the equation of that of
+    /// the row. 1 or, off the diagonal, 0; then the coefficients of q⁻¹ … q⁻ⁿᵃ. `None` if there is no such output.
     pub fn a(&self, row: usize, output: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
         if output >= self.lags.outputs() {
             return None;

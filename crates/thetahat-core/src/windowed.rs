@@ -10,8 +10,8 @@ use crate::{Action, Dimension, Error, Innovation, LeastSquares, Real, Solution};
 
 /// How long a window is: so many blocks of so many samples.
 ///
-/// It slides by whole blocks: with blocks of one sample it holds exactly the last `blocks` samples; with longer ones between
-/// (`blocks` - 1) `block` + 1 and `blocks` `block`, as the oldest block leaves when a new one begins.
+/// It slides by whole blocks: with blocks of one sample it holds exactly the last `blocks` samples; with longer ones
+/// between (`blocks` - 1) `block` + 1 and `blocks` `block`, as the oldest block leaves when a new one begins.
 ///
 /// ```
 /// use thetahat_core::Window;
@@ -47,22 +47,23 @@ impl Window {
 /// θ̂(k) = arg min Σ over the window (y(i) - φ(i)'θ)²,      i = k - W + 1 … k
 /// ```
 ///
-/// What has left the window has left without trace, where a forgetting factor leaves a tail: after a change of the plant the
-/// estimate is that of the new one W samples later. There is no prior, no offset and no sign convention: what φ means is the
-/// caller's, and [`Lags`](crate::Lags) makes it of inputs and outputs. [`Window`] says how long it is.
+/// What has left the window has left without trace, where a forgetting factor leaves a tail: after a change of the
+/// plant the estimate is that of the new one W samples later. There is no prior, no offset and no sign convention: what
+/// φ means is the caller's, and [`Lags`](crate::Lags) makes it of inputs and outputs. [`Window`] says how long it is.
 ///
 /// # How it forgets
 ///
-/// Nothing is ever subtracted. Each block of samples is kept as the triangle of [`LeastSquares`], \[R z; 0 ρ\]. The older
-/// blocks have been merged from the newest of them backwards, so that the triangle of "this block and all older ones after it" is
-/// at hand for each; the newer ones are merged as they come. A step rotates its sample in, and merges the two parts. When the last
-/// of the older blocks has left, the newer ones become the older ones, by one merge each. (Two stacks, as in aggregation over
-/// sliding windows: Tangwongsan, Hirzel, Schneider and Wu, General incremental sliding-window aggregation, 2015.)
+/// Nothing is ever subtracted. Each block of samples is kept as the triangle of [`LeastSquares`], \[R z; 0 ρ\]. The
+/// older blocks have been merged from the newest of them backwards, so that the triangle of "this block and all older
+/// ones after it" is at hand for each; the newer ones are merged as they come. A step rotates its sample in, and merges
+/// the two parts. When the last of the older blocks has left, the newer ones become the older ones, by one merge each.
+/// (Two stacks, as in aggregation over sliding windows: Tangwongsan, Hirzel, Schneider and Wu, General incremental
+/// sliding-window aggregation, 2015.)
 ///
-/// To take a sample back out of a triangle (downdating) would cost no memory, but the result is a difference: what is left may be
-/// small beside what was taken out, and rounding stays. The relative error of the parameters against the batch in double precision,
-/// at most in 10^6 steps (10^5 where the scale changes), with four regressors in `f32`, noise-free outputs and a window of 100
-/// samples:
+/// To take a sample back out of a triangle (downdating) would cost no memory, but the result is a difference: what is
+/// left may be small beside what was taken out, and rounding stays. The relative error of the parameters against the
+/// batch in double precision, at most in 10^6 steps (10^5 where the scale changes), with four regressors in `f32`,
+/// noise-free outputs and a window of 100 samples:
 ///
 /// | | steady | rich, silent, held | scale changes by 10^3 |
 /// |---|---|---|---|
@@ -70,24 +71,26 @@ impl Window {
 /// | the same, with a fresh triangle every 100 samples | 4e-6 | 3e-6 | no digit |
 /// | this | 3e-7 | 3e-7 | 1e-5 |
 ///
-/// Through 10^7 steps of all three at once, with noise, it stays within 8 κ ε of the batch, κ the condition number of the window in
-/// units of the columns' norms (measured by `make soak`).
+/// Through 10^7 steps of all three at once, with noise, it stays within 8 κ ε of the batch, κ the condition number of
+/// the window in units of the columns' norms (measured by `make soak`).
 ///
 /// # What is not excited
 ///
-/// Where the regressors of the window do not determine the parameters, as in a silence of its length, there is no such minimum. Then
-/// the last estimate that was one is kept, [`Action::Collecting`] says so, and [`solution`](WindowedLeastSquares::solution) is
-/// the error that names a column. They determine the parameters if more than 100 n ε of each column is left once those before it
-/// are projected out: with less, rounding alone would make up a good part of the estimate.
+/// Where the regressors of the window do not determine the parameters, as in a silence of its length, there is no such
+/// minimum. Then the last estimate that was one is kept, [`Action::Collecting`] says so, and
+/// [`solution`](WindowedLeastSquares::solution) is the error that names a column. They determine the parameters if more
+/// than 100 n ε of each column is left once those before it are projected out: with less, rounding alone would make up
+/// a good part of the estimate.
 ///
 /// # Size and cost
 ///
-/// `B` is the buffer for the blocks, at least [`Window::numbers`]. Memory: B + 6 n² + 7 n + 6 numbers, and some counters. A step
-/// costs some 13 n² + 5/3 n³ flops and n²/2 + 7 n/2 square roots; once in `blocks` `block` samples, when
-/// the newer blocks become the older ones, `blocks` merges of 5/3 n³ flops and n²/2 square roots come on top: where each step has its
-/// deadline, take few long blocks.
+/// `B` is the buffer for the blocks, at least [`Window::numbers`]. Memory: B + 6 n² + 7 n + 6 numbers, and some
+/// counters. A step costs some 13 n² + 5/3 n³ flops and n²/2 + 7 n/2 square roots; once in `blocks` `block` samples,
+/// when the newer blocks become the older ones, `blocks` merges of 5/3 n³ flops and n²/2 square roots come on top:
+/// where each step has its deadline, take few long blocks.
 ///
-/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3 (updating, and what downdating costs in digits).
+/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3 (updating, and what downdating costs
+/// in digits).
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Vector2};
@@ -119,8 +122,8 @@ impl Window {
 #[cfg_attr(feature = "serde", serde(try_from = "snapshot::Snapshot<T, N, B>"))]
 pub struct WindowedLeastSquares<T: Real, N: Dimension, B: Dimension> {
     window: Window,
-    /// Places for the triangles of blocks: the newer ones from the front; the older ones at the end, each merged with those
-    /// after it.
+    /// Places for the triangles of blocks: the newer ones from the front; the older ones at the end, each merged with
+    /// those after it.
     stored: OVector<T, B>,
     /// All samples of the newer blocks and of the one that is not complete.
     newer: LeastSquares<T, N>,
@@ -138,8 +141,8 @@ pub struct WindowedLeastSquares<T: Real, N: Dimension, B: Dimension> {
 impl<T: Real, N: Dimension, B: Dimension> WindowedLeastSquares<T, N, B> {
     /// An empty window for `size` parameters: `Const::<4>`, or `Dyn(4)` with the feature `alloc`.
     ///
-    /// Errors: [`Error::OutOfRange`] if a window without its oldest block has fewer samples than parameters, or a number does
-    /// not fit; [`Error::Length`] if `B` is too small.
+    /// Errors: [`Error::OutOfRange`] if a window without its oldest block has fewer samples than parameters, or a
+    /// number does not fit; [`Error::Length`] if `B` is too small.
     pub fn new(size: N, window: Window) -> Result<Self, Error> {
         let n = size.value();
         let shortest = window.blocks.checked_sub(1).and_then(|blocks| blocks.checked_mul(window.block));
@@ -168,12 +171,12 @@ impl<T: Real, N: Dimension, B: Dimension> WindowedLeastSquares<T, N, B> {
 
     /// One sample: it enters the window, and what it takes the place of leaves.
     ///
-    /// NaN in φ or y is a missing sample: nothing changes, and nothing leaves. The innovation is y - φ'θ̂ with the estimate before, its
-    /// variance σ̂² (1 + φ'(R'R)⁻¹φ) from the window before; NaN, and `nis` 0, while that has no more samples than parameters or does
-    /// not determine them.
+    /// NaN in φ or y is a missing sample: nothing changes, and nothing leaves. The innovation is y - φ'θ̂ with the
+    /// estimate before, its variance σ̂² (1 + φ'(R'R)⁻¹φ) from the window before; NaN, and `nis` 0, while that has no
+    /// more samples than parameters or does not determine them.
     ///
-    /// [`Action`] tells what was done: `Updated`; `Collecting`, where the window does not determine the parameters, which
-    /// stay; `Missing`.
+    /// [`Action`] tells what was done: `Updated`; `Collecting`, where the window does not determine the parameters,
+    /// which stay; `Missing`.
     ///
     /// Errors, after which nothing has changed: [`Error::Infinite`]; [`Error::TooLarge`], as for [`LeastSquares::add`];
     /// [`Error::Length`] (only with `Dyn`).
@@ -265,8 +268,8 @@ impl<T: Real, N: Dimension, B: Dimension> WindowedLeastSquares<T, N, B> {
         self.determined = self.all.is_determined(T::from_count(100) * T::from_count(n) * T::EPSILON);
     }
 
-    /// The parameters θ̂: those of the window, or, where it does not determine them, those of the last one that did; 0 before
-    /// there was one.
+    /// The parameters θ̂: those of the window, or, where it does not determine them, those of the last one that did; 0
+    /// before there was one.
     pub fn parameters(&self) -> &OVector<T, N> {
         &self.parameters
     }
@@ -296,14 +299,14 @@ impl<T: Real, N: Dimension, B: Dimension> WindowedLeastSquares<T, N, B> {
         self.window
     }
 
-    /// σ̂² = ρ²/(m - n), the variance of the residuals of the window, in the unit of y²; `None` while it has no more samples than
-    /// parameters, or does not determine them.
+    /// σ̂² = ρ²/(m - n), the variance of the residuals of the window, in the unit of y²; `None` while it has no more
+    /// samples than parameters, or does not determine them.
     pub fn noise_variance(&self) -> Option<T> {
         if self.determined { self.all.residual_variance() } else { None }
     }
 
-    /// The standard errors of the parameters, and `None` where [`noise_variance`](WindowedLeastSquares::noise_variance) is. About 6
-    /// n³ flops.
+    /// The standard errors of the parameters, and `None` where [`noise_variance`](WindowedLeastSquares::noise_variance)
+    /// is. About 6 n³ flops.
     pub fn standard_errors(&self) -> Option<OVector<T, N>> {
         if self.determined { self.solution().ok()?.standard_errors() } else { None }
     }

@@ -234,8 +234,8 @@ fn without_forgetting_the_horizon_is_finite() {
     assert!(horizon.is_none_or(|step| step > 200_000), "{horizon:?}");
 }
 
-/// A window of 100 samples, exactly or in blocks, through silences, held inputs and scales that change by 10^3: always that of the
-/// least squares of its samples in double precision, or the last one that was.
+/// A window of 100 samples, exactly or in blocks, through silences, held inputs and scales that change by 10^3: always
+/// that of the least squares of its samples in double precision, or the last one that was.
 #[test]
 fn windowed_least_squares() {
     for window in [Window { blocks: 100, block: 1 }, Window { blocks: 10, block: 10 }] {
@@ -282,7 +282,8 @@ fn windowed_least_squares() {
     }
 }
 
-/// Models with noise of the sensor follow a plant that switches, through silences, held inputs and missing measurements.
+/// Models with noise of the sensor follow a plant that switches, through silences, held inputs and missing
+/// measurements.
 #[test]
 fn recursive_output_error() {
     for method in [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments] {

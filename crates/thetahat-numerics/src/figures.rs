@@ -1,5 +1,5 @@
-//! How numbers are written for people: in tables, on pages and in sentences. All are written here, so that none is wider than
-//! [`WIDEST`], and none is `NaN` or `inf`.
+//! How numbers are written for people: in tables, on pages and in sentences. All are written here, so that none is
+//! wider than [`WIDEST`], and none is `NaN` or `inf`.
 
 /// No number takes more characters.
 pub const WIDEST: usize = 12;

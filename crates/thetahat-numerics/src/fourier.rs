@@ -12,9 +12,9 @@ use thetahat_core::nalgebra::Complex;
 /// X_k = sum_t x(t) exp(-i 2 pi k t/L),   k = 0 … L - 1
 /// ```
 ///
-/// They are the real and imaginary parts of one complex signal z, and by their symmetry X_k = (Z_k + conj Z_{L-k})/2 and
-/// Y_k = (Z_k - conj Z_{L-k})/(2i) (Press et al. 2007, Numerical Recipes, section 12.3.1). Rounding errors are of the size of the
-/// larger one: signals should be scaled alike. O(L log L) for every L, memory O(L).
+/// They are the real and imaginary parts of one complex signal z, and by their symmetry X_k = (Z_k + conj Z_{L-k})/2
+/// and Y_k = (Z_k - conj Z_{L-k})/(2i) (Press et al. 2007, Numerical Recipes, section 12.3.1). Rounding errors are of
+/// the size of the larger one: signals should be scaled alike. O(L log L) for every L, memory O(L).
 pub struct PairTransform {
     plan: Arc<dyn Fft<f64>>,
     values: Vec<Complex<f64>>,
@@ -52,8 +52,8 @@ impl Pair<'_> {
     }
 }
 
-/// The transform of complex signals of this length, at least 1, and its inverse times that length: without instruction sets of
-/// their own, so that they have the same bits on every processor.
+/// The transform of complex signals of this length, at least 1, and its inverse times that length: without instruction
+/// sets of their own, so that they have the same bits on every processor.
 pub fn portable(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
     let mut planner = FftPlannerScalar::new();
     [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]

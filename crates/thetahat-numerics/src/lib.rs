@@ -1,5 +1,6 @@
-//! What estimates of dynamic systems are computed with, whatever the model: the ground floor of [`thetahat`], compiled once beside
-//! it. Use it through that crate; what it gives on is stable there, all else here may change with any version.
+//! What estimates of dynamic systems are computed with, whatever the model: the ground floor of [`thetahat`], compiled
+//! once beside it. Use it through that crate; what it gives on is stable there, all else here may change with any
+//! version.
 //!
 //! | module | what it is for |
 //! |---|---|

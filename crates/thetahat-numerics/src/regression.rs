@@ -1,6 +1,6 @@
-//! Linear regression on lagged signals: `lagged` states the problem, `solve` solves it; `gram` forms its Gram matrix from lagged
-//! products, `qr` folds its rows into a triangle where that is not exact enough, `extended` sums products in twice the precision
-//! where the rows are gone when it is solved.
+//! Linear regression on lagged signals: `lagged` states the problem, `solve` solves it; `gram` forms its Gram matrix
+//! from lagged products, `qr` folds its rows into a triangle where that is not exact enough, `extended` sums products
+//! in twice the precision where the rows are gone when it is solved.
 
 mod blocks;
 pub mod convex;

@@ -1,7 +1,7 @@
 //! How text that comes from files is shown: names, and messages about what is wrong with a file.
 //!
-//! A name may hold anything. Written to a terminal as it is, it could move the cursor, change the title of the window, or look
-//! like another name.
+//! A name may hold anything. Written to a terminal as it is, it could move the cursor, change the title of the window,
+//! or look like another name.
 
 use std::fmt::Write;
 
@@ -10,9 +10,8 @@ const LONGEST: usize = 1000;
 const START: usize = 600;
 const END: usize = 300;
 
-/// Whether a character is invisible: the control characters, those that break lines,
-/// set the direction of writing or have no width (Unicode 16, category Cc, `Default_Ignorable_Code_Point`, U+2028, U+2029 and
-/// U+FFF9 to U+FFFB).
+/// Whether a character is invisible: the control characters, those that break lines, set the direction of writing or
+/// have no width (Unicode 16, category Cc, `Default_Ignorable_Code_Point`, U+2028, U+2029 and U+FFF9 to U+FFFB).
 ///
 /// ```
 /// use thetahat_numerics::text::is_invisible;
@@ -65,8 +64,8 @@ pub fn brief(name: &str, longest: usize) -> String {
     shown
 }
 
-/// A message that may repeat parts of a file: [`harmless`], and at most 1000 characters long. Of a longer one the start and
-/// the end are kept, which say what and where.
+/// A message that may repeat parts of a file: [`harmless`], and at most 1000 characters long. Of a longer one the start
+/// and the end are kept, which say what and where.
 ///
 /// ```
 /// let long = format!("unknown field `{}` at line 1 column 9", "x".repeat(50_000_000));
@@ -103,7 +102,8 @@ pub fn json(text: &str) -> String {
     escaped_json(serde_json::Value::from(text).to_string())
 }
 
-/// A JSON text with what is invisible as escapes, except line breaks, which stand between its tokens only. It says the same.
+/// A JSON text with what is invisible as escapes, except line breaks, which stand between its tokens only. It says the
+/// same.
 pub fn escaped_json(json: String) -> String {
     let is_shown = |character: char| character == '\n' || !is_invisible(character);
     if json.chars().all(is_shown) {

@@ -1,7 +1,8 @@
 //! Fields that runs of blanks and tabs separate.
 //!
-//! Such a text becomes one with tabs without changing its length, so that places in it stay what they are: the last blank
-//! between two fields becomes a tab, all others become spaces, which are trimmed. Blanks at the ends of a line separate nothing.
+//! Such a text becomes one with tabs without changing its length, so that places in it stay what they are: the last
+//! blank between two fields becomes a tab, all others become spaces, which are trimmed. Blanks at the ends of a line
+//! separate nothing.
 
 use std::io::{self, Read};
 
@@ -58,7 +59,8 @@ pub(super) fn separated(text: &[u8]) -> Vec<u8> {
 pub(super) struct Separated<R> {
     text: R,
     place: Place,
-    /// What was read: first what is still to be given, from `position` on, and the last blank if it is not known yet what it is.
+    /// What was read: first what is still to be given, from `position` on, and the last blank if it is not known yet
+    /// what it is.
     ready: Vec<u8>,
     position: usize,
     /// Where in `ready` what is to be given ends.

@@ -215,8 +215,8 @@ pub(super) fn of_numbers(name: &str, unit: Option<&str>, numbers: &[f64], given:
         }
     }
     let Some(step) = step else { return plain(Written::Numbers(Unit::Seconds)) };
-    // Steps of a spreadsheet's days are whole seconds, or tenths of them, and hardly ever a short number of days: a clock of seconds
-    // that has run for half a day has such steps.
+    // Steps of a spreadsheet's days are whole seconds, or tenths of them, and hardly ever a short number of days: a
+    // clock of seconds that has run for half a day has such steps.
     let tenths = step * 864_000.0;
     let is_short = (super::error::rounded(step) / step - 1.0).abs() < 1e-6;
     let dated = name.to_lowercase().starts_with("dat");

@@ -1,7 +1,7 @@
 //! Logs in columns: Parquet files, and Arrow IPC files and streams.
 //!
-//! All come as batches of Arrow arrays, of the selected columns only. Files are read from their end, where their directory is;
-//! only a stream may come through a pipe.
+//! All come as batches of Arrow arrays, of the selected columns only. Files are read from their end, where their
+//! directory is; only a stream may come through a pipe.
 
 mod batches;
 mod clock;
@@ -313,7 +313,8 @@ impl Conversion {
         }
     }
 
-    /// Appends the rows of a batch. Where a value is wrong it is NaN, and all faults are kept, or the first one of each column.
+    /// Appends the rows of a batch. Where a value is wrong it is NaN, and all faults are kept, or the first one of each
+    /// column.
     fn append(&mut self, batch: &RecordBatch, part: &mut Part, all: bool) -> Result<(), Error> {
         let Self { columns, fields, time, clock, rows, .. } = self;
         let start = part.rows;

@@ -31,11 +31,13 @@ const fn each(byte: u8) -> u64 {
     u64::from_ne_bytes([byte; 8])
 }
 
-/// Reads the number at the front of a text and returns its length, if it is a short one: up to seven digits, a point and up to
-/// fifteen more. What follows, an exponent for example, is not looked at; None means only that someone else has to look.
+/// Reads the number at the front of a text and returns its length, if it is a short one: up to seven digits, a point
+/// and up to fifteen more. What follows, an exponent for example, is not looked at; None means only that someone else
+/// has to look.
 ///
-/// Its digits without the point, m, and the power of ten by which it divides them are exact in `f64`, so that their quotient is
-/// the number that is nearest to what is written (Clinger, How to read floating point numbers accurately, 1990, section 2).
+/// Its digits without the point, m, and the power of ten by which it divides them are exact in `f64`, so that their
+/// quotient is the number that is nearest to what is written (Clinger, How to read floating point numbers accurately,
+/// 1990, section 2).
 #[inline(always)]
 pub(super) fn short(text: &[u8]) -> Option<(f64, usize)> {
     let sign = usize::from(*text.first()? == b'-');
@@ -70,8 +72,8 @@ impl Word {
     fn of(text: &[u8]) -> Option<Self> {
         let word = u64::from_le_bytes(*text.first_chunk()?);
         let values = word ^ each(b'0');
-        // Of any byte but a digit the sum, or it itself, has the highest bit; a digit or a point carries nothing into the bytes
-        // after it.
+        // Of any byte but a digit the sum, or it itself, has the highest bit; a digit or a point carries nothing into
+        // the bytes after it.
         let others = (values.wrapping_add(each(0x76)) | values) & each(0x80);
         Some(Self { values, others })
     }
@@ -82,8 +84,8 @@ impl Word {
         (number(self.values, bits), bits as usize / 8)
     }
 
-    /// The number that the first digits are, one at least and all before something else, without a point among them; the length of
-    /// all that, and how many of the digits are after the point.
+    /// The number that the first digits are, one at least and all before something else, without a point among them;
+    /// the length of all that, and how many of the digits are after the point.
     fn head(&self) -> Option<(u64, usize, usize)> {
         const POINT: u64 = (b'.' ^ b'0') as u64;
         let whole = self.others.trailing_zeros() & !7;

@@ -150,8 +150,8 @@ impl Reader {
         }
     }
 
-    /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
-    /// is a number, and not all are missing.
+    /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values
+    /// there is a number, and not all are missing.
     pub fn words(&self) -> Vec<bool> {
         match &self.any {
             AnyReader::Text(reader) => reader.words(),
@@ -186,7 +186,8 @@ impl Reader {
         }
     }
 
-    /// The columns of a text that are called as clocks are, or hold dates: without being a clock, they may be meant as one.
+    /// The columns of a text that are called as clocks are, or hold dates: without being a clock, they may be meant as
+    /// one.
     pub fn called_clocks(&self) -> Vec<usize> {
         match &self.any {
             AnyReader::Text(reader) => reader.called_clocks(),
@@ -214,8 +215,8 @@ impl Reader {
         Ok(whole)
     }
 
-    /// The same in parts, each with `most` rows or a little more, the last one with what is left: memory does not grow with the
-    /// rows. None: all in one.
+    /// The same in parts, each with `most` rows or a little more, the last one with what is left: memory does not grow
+    /// with the rows. None: all in one.
     pub fn read_parts(
         self,
         selection: &Selection,
@@ -247,8 +248,8 @@ impl Reader {
     }
 
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
-    /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
-    /// from the first one.
+    /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are,
+    /// or from the first one.
     pub fn stream(
         self,
         selection: &Selection,

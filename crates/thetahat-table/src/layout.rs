@@ -55,7 +55,8 @@ impl Layout {
         self.columns.get(column)?.states
     }
 
-    /// How the times of a column are written, as its name, its unit and its first values show it. None where they do not.
+    /// How the times of a column are written, as its name, its unit and its first values show it. None where they do
+    /// not.
     ///
     /// # Errors
     /// A message for dates that can be read in two ways.
@@ -70,7 +71,8 @@ impl Layout {
         self.units.get(column).map(String::as_str)
     }
 
-    /// The columns that are clocks by their names and their first values; a column of days goes with the times of day beside it.
+    /// The columns that are clocks by their names and their first values; a column of days goes with the times of day
+    /// beside it.
     pub(super) fn clocks(&self) -> Vec<ClockColumns> {
         let sample = |column: usize| self.columns.get(column).map(|own| &own.sample);
         let is_day = |column| sample(column).is_some_and(clock::are_days);

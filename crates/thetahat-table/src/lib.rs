@@ -1,11 +1,11 @@
-//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files and
-//! streams; and logs of flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash (ArduPilot) and WPILib
-//! data logs.
+//! Logs in tables, read into columns of numbers: text (CSV), spreadsheets, MATLAB files, Parquet, and Arrow IPC files
+//! and streams; and logs of flights and robots, whose topics have clocks of their own: ULog (PX4), DataFlash
+//! (ArduPilot) and WPILib data logs.
 //!
 //! [`Reader::open`] knows the format by the first bytes, reads as far as the first row and knows the columns' names;
-//! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two blocks
-//! of a mebibyte, the others batch by batch. [`Reader::read_parts`] gives a log in parts, [`Reader::open_live`] and
-//! [`Reader::stream`] the rows one by one as they come.
+//! [`Reader::read`] reads the columns that were selected. The file is never held in memory: a text passes through two
+//! blocks of a mebibyte, the others batch by batch. [`Reader::read_parts`] gives a log in parts, [`Reader::open_live`]
+//! and [`Reader::stream`] the rows one by one as they come.
 //!
 //! ```
 //! use thetahat_table::{Options, Reader, Selection};
@@ -29,19 +29,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What is understood of texts, by itself: commas, semicolons, tabs or runs of blanks between fields; quotes as in RFC 4180; lines
-//! that end with LF, CR LF or CR; blank lines, and lines above the names; units below them; comments; decimal commas, groups of digits
-//! and percent signs; words for off and on, and for missing values; gzip; UTF-16 with a byte-order mark. Other encodings by name;
-//! times as seconds, as ISO 8601 or in a given format.
+//! What is understood of texts, by itself: commas, semicolons, tabs or runs of blanks between fields; quotes as in RFC
+//! 4180; lines that end with LF, CR LF or CR; blank lines, and lines above the names; units below them; comments;
+//! decimal commas, groups of digits and percent signs; words for off and on, and for missing values; gzip; UTF-16 with
+//! a byte-order mark. Other encodings by name; times as seconds, as ISO 8601 or in a given format.
 //!
-//! The columns of a log of topics are called `topic.field`, and [`Reader::topics`] lists them. Columns of one topic are a table like
-//! any other; of columns of several topics each has its clock in [`Table::clocks`].
+//! The columns of a log of topics are called `topic.field`, and [`Reader::topics`] lists them. Columns of one topic are
+//! a table like any other; of columns of several topics each has its clock in [`Table::clocks`].
 //!
-//! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call it:
-//! `decimal-comma`.
+//! Messages name a field of [`Options`] that would help between backticks, as a command line or a notebook would call
+//! it: `decimal-comma`.
 //!
-//! What is not done here: the order of the times is not checked, and names may repeat. The crate knows nothing of models, nor of
-//! terminals.
+//! What is not done here: the order of the times is not checked, and names may repeat. The crate knows nothing of
+//! models, nor of terminals.
 
 mod blanks;
 mod block;
@@ -102,7 +102,8 @@ pub enum Header {
 /// How a log is written, as far as it is not recognised by itself.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The byte between two fields; recognised from the first rows if it is not given. A space stands for runs of blanks and tabs.
+    /// The byte between two fields; recognised from the first rows if it is not given. A space stands for runs of
+    /// blanks and tabs.
     pub delimiter: Option<u8>,
     /// Whether numbers are written with a decimal comma; recognised from the first rows if it is not given.
     pub decimal_comma: Option<bool>,
@@ -112,8 +113,9 @@ pub struct Options {
     pub skip_rows: usize,
     /// The first character of a line that is a comment.
     pub comment: Option<u8>,
-    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`, and besides what historians and
-    /// spreadsheets write, such as `Bad` and `#N/A`. Case does not matter, and a number stands for all ways to write it.
+    /// Words that stand for a missing value, besides an empty field, `NaN`, `NA`, `N/A` and `null`, and besides what
+    /// historians and spreadsheets write, such as `Bad` and `#N/A`. Case does not matter, and a number stands for all
+    /// ways to write it.
     pub missing: Vec<String>,
     /// Words that stand for numbers, besides pairs such as `off` and `on`.
     pub values: Vec<(String, f64)>,
@@ -237,8 +239,8 @@ impl Table {
 pub struct Table {
     /// The selected columns, in the selection's order; a missing value is NaN.
     pub columns: Vec<Vec<f64>>,
-    /// The times in seconds: as they are if they are numbers, and since the first one if they are dates, or numbers that count from
-    /// 1970 or from another day.
+    /// The times in seconds: as they are if they are numbers, and since the first one if they are dates, or numbers
+    /// that count from 1970 or from another day.
     pub time: Option<Vec<f64>>,
     /// The first time in ISO 8601, if it is a date.
     pub start: Option<String>,

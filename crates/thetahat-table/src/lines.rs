@@ -12,8 +12,8 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// A row of a file, or of a part of it after so many rows, as messages name it: by its line, as an editor counts, or without
-    /// lines by its number.
+    /// A row of a file, or of a part of it after so many rows, as messages name it: by its line, as an editor counts,
+    /// or without lines by its number.
     pub fn place(&self, file: &str, row: usize, before: usize) -> String {
         if self.runs.is_empty() {
             format!("{file}: row {}", before + row + 1)

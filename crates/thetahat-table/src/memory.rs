@@ -50,8 +50,8 @@ impl Bound {
     }
 }
 
-/// The bytes that this process can still have: of the machine, of its control group, and of its own limit. None where nothing
-/// says so.
+/// The bytes that this process can still have: of the machine, of its control group, and of its own limit. None where
+/// nothing says so.
 fn free() -> Option<u64> {
     [machine(), group(), own()].into_iter().flatten().min()
 }

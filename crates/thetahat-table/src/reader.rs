@@ -56,8 +56,8 @@ pub(super) struct TextReader {
 }
 
 impl TextReader {
-    /// Reads a stream as far as its first row, and nothing that it would have to wait for: it may be a pipe on which the next row
-    /// is yet to come. For [`stream`](TextReader::stream).
+    /// Reads a stream as far as its first row, and nothing that it would have to wait for: it may be a pipe on which
+    /// the next row is yet to come. For [`stream`](TextReader::stream).
     pub(super) fn start_live(mut source: Source, options: &Options) -> Result<Self, Error> {
         let head = source.look_ahead(SIZES.row, |text| shape::has_row(text, options));
         let sizes = Sizes { block: head.len(), ..SIZES };
@@ -213,8 +213,8 @@ impl TextReader {
         &self.plan.layout.names
     }
 
-    /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values there
-    /// is a number, and not all are missing.
+    /// The columns that hold something else than numbers, as far as the first rows show it: not one of their values
+    /// there is a number, and not all are missing.
     pub(super) fn words(&self) -> Vec<bool> {
         let of = |column: usize| self.plan.layout.columns.get(column).is_some_and(|column| column.no_numbers);
         (0..self.plan.layout.width()).map(of).collect()
@@ -319,8 +319,8 @@ impl TextReader {
     }
 
     /// Gives the rows of the selected columns one by one. With `whole_lines` a last line that has no line break yet is
-    /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are, or
-    /// from the first one.
+    /// not taken for a row: who writes the log may not have finished it. Dates count from `start`, written as they are,
+    /// or from the first one.
     pub(super) fn stream(
         mut self,
         selection: &Selection,

@@ -169,12 +169,12 @@ impl Plan {
         }
     }
 
-    /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about
-    /// `piece_size` bytes. The text is about this `share` of all there is from the first row on, with what was read before;
-    /// none if nobody knows.
+    /// Reads the rows of a text that starts with a row and ends with a newline, in pieces of about `piece_size` bytes.
+    /// The text is about this `share` of all there is from the first row on, with what was read before; none if nobody
+    /// knows.
     ///
-    /// Returns how much of the text was read: all of it, unless a quoted field goes on after it. `unended` is whether the
-    /// log ends with this text, and without a line break: a last row with too few fields was cut.
+    /// Returns how much of the text was read: all of it, unless a quoted field goes on after it. `unended` is whether
+    /// the log ends with this text, and without a line break: a last row with too few fields was cut.
     pub(super) fn read(
         &self,
         text: &[u8],
@@ -231,7 +231,8 @@ impl Plan {
         read
     }
 
-    /// Reads the row at the front of a text into `values`, one for each field, and returns its length, unless it needs care.
+    /// Reads the row at the front of a text into `values`, one for each field, and returns its length, unless it needs
+    /// care.
     pub(super) fn row<'v>(&self, text: &[u8], values: impl Iterator<Item = &'v mut f64>) -> Option<usize> {
         let (mut taken, mut field) = (0, 0);
         for (value, &wanted) in values.zip(&self.fields) {
@@ -268,8 +269,8 @@ impl Plan {
         if index + 1 == self.layout.width() { b'\n' } else { self.layout.dialect.delimiter }
     }
 
-    /// Reads the value at the front of a text, and returns it with the length of its field: most are short numbers and nothing
-    /// else, whose end need not be searched for.
+    /// Reads the value at the front of a text, and returns it with the length of its field: most are short numbers and
+    /// nothing else, whose end need not be searched for.
     #[inline]
     fn number(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
         if self.numbers.are_plain() && self.has_numbers(index) {
@@ -296,8 +297,8 @@ impl Plan {
         }
     }
 
-    /// Reads the value at the front of a text, whatever it is, and returns it with the length of its field, unless it needs
-    /// care.
+    /// Reads the value at the front of a text, whatever it is, and returns it with the length of its field, unless it
+    /// needs care.
     #[inline(never)]
     fn value(&self, text: &[u8], index: usize) -> Option<(f64, usize)> {
         let dialect = self.layout.dialect;
@@ -319,7 +320,8 @@ impl Plan {
         Some((value, field.len() + 1))
     }
 
-    /// Reads the content of a field; an error is a message. A status that historians write is a missing value that remembers it.
+    /// Reads the content of a field; an error is a message. A status that historians write is a missing value that
+    /// remembers it.
     fn content(&self, content: &[u8], index: usize) -> Result<f64, String> {
         if let Some(clock) = self.clock(index) {
             return clock.read(content, &self.numbers);

@@ -64,7 +64,8 @@ pub(super) enum Columnar {
 }
 
 impl Format {
-    /// The first bytes of each. Those of a stream are the mark before each of its messages, and no text in any encoding.
+    /// The first bytes of each. Those of a stream are the mark before each of its messages, and no text in any
+    /// encoding.
     const MARKS: [(&[u8], Self); 12] = [
         (b"PAR1", Self::Columnar(Columnar::Parquet)),
         (b"PARE", Self::Columnar(Columnar::EncryptedParquet)),
@@ -190,8 +191,8 @@ pub(super) struct Source {
 }
 
 impl Source {
-    /// Decodes a stream of bytes. UTF-16 is known by its byte-order mark; a mark also overrules `encoding`. Without either,
-    /// the bytes are passed on as they are.
+    /// Decodes a stream of bytes. UTF-16 is known by its byte-order mark; a mark also overrules `encoding`. Without
+    /// either, the bytes are passed on as they are.
     pub(super) fn new(bytes: Bytes, encoding: Option<&'static Encoding>) -> Self {
         let Bytes { name, bytes, gzip, bytes_read, total, .. } = bytes;
         // Decoding UTF-8 to UTF-8 would take time and hide what is wrong with it.
@@ -250,7 +251,8 @@ impl Source {
         }
     }
 
-    /// Reads no more than it takes to be `enough`, or `most` bytes, or all there is. It is read again afterwards, and so is an error.
+    /// Reads no more than it takes to be `enough`, or `most` bytes, or all there is. It is read again afterwards, and
+    /// so is an error.
     pub(super) fn look_ahead(&mut self, most: usize, enough: impl Fn(&[u8]) -> bool) -> Vec<u8> {
         let (mut head, mut piece) = (Vec::new(), vec![0; PIECE]);
         let mut failed = None;

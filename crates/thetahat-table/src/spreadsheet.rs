@@ -1,7 +1,8 @@
 //! Spreadsheets: a sheet of a workbook (xlsx) as a text with tabs, which is then read as any other.
 //!
-//! A damaged file, or one that was made to do harm, must not ask for more memory than there is: the sizes that it states are
-//! compared with what is there before the library that reads it believes them, and cells are taken one by one.
+//! A damaged file, or one that was made to do harm, must not ask for more memory than there is: the sizes that it
+//! states are compared with what is there before the library that reads it believes them, and cells are taken one by
+//! one.
 
 use std::fmt::Write as _;
 use std::io::{Cursor, Read};
@@ -45,7 +46,8 @@ impl From<String> for Refusal {
 /// Reads the sheet of a workbook that the options name, or the first that holds numbers.
 ///
 /// # Errors
-/// That the file cannot be read, is damaged or encrypted, is of another format, does not fit into memory, or has no such sheet.
+/// That the file cannot be read, is damaged or encrypted, is of another format, does not fit into memory, or has no
+/// such sheet.
 pub(super) fn read(bytes: Bytes, options: &Options) -> Result<Sheet, Error> {
     let file = bytes.name().to_owned();
     let bad = |message: String| Error::data(&file, None, message);

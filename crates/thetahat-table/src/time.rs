@@ -259,7 +259,8 @@ impl Clock {
         }
     }
 
-    /// The first time of a clock of days whose times of day are in another column, in ISO 8601; none if one of them has no calendar.
+    /// The first time of a clock of days whose times of day are in another column, in ISO 8601; none if one of them has
+    /// no calendar.
     pub(super) fn start_at(&self, times: &Self) -> Option<String> {
         match (self, times) {
             // Times of day count from the beginning of 1970.

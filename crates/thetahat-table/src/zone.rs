@@ -51,8 +51,9 @@ impl Zone {
         Ok(())
     }
 
-    /// The instant at which the clocks show so many seconds more than the first time, which is `first` nanoseconds after 1970. Of the hour
-    /// that comes twice, where clocks are set back, it is the first, unless that was over already.
+    /// The instant at which the clocks show so many seconds more than the first time, which is `first` nanoseconds
+    /// after 1970. Of the hour that comes twice, where clocks are set back, it is the first, unless that was over
+    /// already.
     fn instant(&self, first: i64, seconds: f64) -> Option<Timestamp> {
         let wall = Timestamp::from_nanosecond(i128::from(first) + (seconds * 1e9).round() as i128).ok()?;
         let read = || self.zone.to_ambiguous_timestamp(Offset::UTC.to_datetime(wall));

@@ -1,8 +1,8 @@
 //! Controllers for a model, and the loops that they give.
 //!
-//! - [`control`] designs one by a [`Design`]: placed poles, a linear-quadratic measure, or minimum variance. [`Control`] is the document:
-//!   the coefficients, the [`Loop`] that they make with the model, and how many models within the covariance of the parameters it keeps
-//!   stable.
+//! - [`control`] designs one by a [`Design`]: placed poles, a linear-quadratic measure, or minimum variance.
+//!   [`Control`] is the document: the coefficients, the [`Loop`] that they make with the model, and how many models
+//!   within the covariance of the parameters it keeps stable.
 //! - [`Control::controller`] is the controller of the core, that runs.
 //!
 //! ```text

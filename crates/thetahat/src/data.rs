@@ -1,15 +1,16 @@
 //! Logs: channels on a common clock, cut into segments; and what is done to them before a fit.
 //!
-//! - [`Log`] holds [`Channel`]s with one value for each row. It is built from values in memory, with a sample time or with a time for
-//!   each row. A missing value is NaN. [`Log::join`] puts several experiments one after the other.
-//! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a gap.
-//!   A [`JointRecord`] has any number of outputs.
+//! - [`Log`] holds [`Channel`]s with one value for each row. It is built from values in memory, with a sample time or
+//!   with a time for each row. A missing value is NaN. [`Log::join`] puts several experiments one after the other.
+//! - [`Record`] borrows the signals of a log that an estimate sees: an output, the inputs, and the segments without a
+//!   gap. A [`JointRecord`] has any number of outputs.
 //! - [`mended`] makes a clock rise that stood still or went back where it is certain how.
-//! - A [`Finding`] is what a careful reader should know of a log, of a [`FindingKind`]; a [`Decision`] is what a fit did because of one.
+//! - A [`Finding`] is what a careful reader should know of a log, of a [`FindingKind`]; a [`Decision`] is what a fit
+//!   did because of one.
 //! - [`Rows`] and [`Split`] say which rows serve for what. Rows are counted from 1, and a range includes both ends.
 //! - [`Detrend`] finds the [`Offset`] of each channel, [`Prefilter`] is a band of frequencies.
-//! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by [`Interpolation`], after a
-//!   filter ([`AntiAlias`]); a document has a note of it ([`Resampling`]) in its [`Source`].
+//! - [`Recording`] and its [`Times`] are a log with any clock. [`Resample`] puts it on a uniform one by
+//!   [`Interpolation`], after a filter ([`AntiAlias`]); a document has a note of it ([`Resampling`]) in its [`Source`].
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};

@@ -52,17 +52,17 @@ pub trait Document: Serialize + DeserializeOwned + JsonSchema {
     /// Reads a document back. Fields that are not known are left out.
     ///
     /// # Errors
-    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema; if its
-    /// parts do not fit together.
+    /// [`Error::Report`] with line and column if it is not JSON or a field is missing; if it has another major schema;
+    /// if its parts do not fit together.
     fn from_json(text: &str) -> Result<Self, Error>;
 
     /// The JSON Schema of the document.
     fn json_schema() -> serde_json::Value;
 }
 
-/// The methods of a [`Document`] that write, read and describe it. They stand in each `impl`, and not in the trait, so that they
-/// are compiled once, with this crate: a provided method is compiled anew in every crate that calls it, and with it all that
-/// serde and schemars make of the document's fields.
+/// The methods of a [`Document`] that write, read and describe it. They stand in each `impl`, and not in the trait, so
+/// that they are compiled once, with this crate: a provided method is compiled anew in every crate that calls it, and
+/// with it all that serde and schemars make of the document's fields.
 macro_rules! document_methods {
     () => {
         #[inline(never)]

@@ -1,22 +1,25 @@
 //! From a record and orders to parameters.
 //!
 //! - [`estimate()`] fits the model that [`Orders`] say to a [`Record`] by a [`Method`] and gives an [`Estimate`];
-//!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before the first.
-//! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor that merges
-//!   with those of other records.
-//! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`] with a [`Weighting`]); of the [`Subspace`] a
-//!   [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says how well it predicts.
+//!   [`estimate_monitored`] tells a [`Monitor`] of its progress. [`Initial`] says what stands for the samples before
+//!   the first.
+//! - [`arx`] is its short form for models that are linear in their parameters. [`arx_factor`] gives a triangular factor
+//!   that merges with those of other records.
+//! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`] with a [`Weighting`]); of
+//!   the [`Subspace`] a [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says
+//!   how well it predicts.
 //! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
-//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`],
-//!   [`EquationsOutcome`], [`SubspaceOutcome`] (with a [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`]
-//!   (of [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
+//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`], [`SubspaceOutcome`] (with a
+//!   [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`] (of
+//!   [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or
+//!   [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
-//! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999, chapters 7
-//! and 10.
+//! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999,
+//! chapters 7 and 10.
 //!
 //! ```
 //! use thetahat::data::Record;
@@ -176,17 +179,20 @@ pub enum Procedure {
 /// How to estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Method {
-    /// The least sum of squared prediction errors: in one step where they are linear in the parameters, else by a search.
+    /// The least sum of squared prediction errors: in one step where they are linear in the parameters, else by a
+    /// search.
     PredictionError(Search),
-    /// Instrumental variables in four stages, for ARX models: consistent in noise of any colour (Söderström and Stoica 1983).
+    /// Instrumental variables in four stages, for ARX models: consistent in noise of any colour (Söderström and Stoica
+    /// 1983).
     InstrumentalVariables,
     /// Refined instrumental variables, for models of output error (Young 1976).
     RefinedInstrumentalVariables,
-    /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their parameters.
+    /// Another norm of the errors, or bounds on what the parameters may be, for models that are linear in their
+    /// parameters.
     Constrained(ConvexFit),
-    /// Regularised least squares for impulse responses, y = B u + e, with a kernel whose parameters are those of the largest marginal
-    /// likelihood (Chen, Ohlsson and Ljung 2012). The parameters' covariance is that of the posterior distribution. Cost: O(N p) and
-    /// O(p^3) in each of some dozen steps, for p taps.
+    /// Regularised least squares for impulse responses, y = B u + e, with a kernel whose parameters are those of the
+    /// largest marginal likelihood (Chen, Ohlsson and Ljung 2012). The parameters' covariance is that of the posterior
+    /// distribution. Cost: O(N p) and O(p^3) in each of some dozen steps, for p taps.
     ///
     /// ```
     /// use thetahat::data::Record;
@@ -212,13 +218,14 @@ pub enum Method {
     Regularised(Kernel),
     /// A loss of the prediction errors that grows like |e|, for any structure (Huber 1981).
     Robust(Robust),
-    /// The largest likelihood of all measured outputs, by the Kalman filter, for A y = B u + C e with a stable A: through missing
-    /// outputs, and without a first sample left out (Harvey 1989). The covariance is that of the information of the parameters.
+    /// The largest likelihood of all measured outputs, by the Kalman filter, for A y = B u + C e with a stable A:
+    /// through missing outputs, and without a first sample left out (Harvey 1989). The covariance is that of the
+    /// information of the parameters.
     ///
-    /// The response to the inputs begins at rest ([`Initial::Zero`]), or in a state that is estimated ([`Initial::Estimate`]);
-    /// auto takes the second where samples were measured before a segment, or it is worth its parameters. The process C/A e begins
-    /// with its stationary covariance. An iteration takes O(N (m^2 (na + nc) + m p + p^2)), m = max(na, nc); without missing outputs
-    /// the first term is soon over.
+    /// The response to the inputs begins at rest ([`Initial::Zero`]), or in a state that is estimated
+    /// ([`Initial::Estimate`]); auto takes the second where samples were measured before a segment, or it is worth its
+    /// parameters. The process C/A e begins with its stationary covariance. An iteration takes O(N (m^2 (na + nc) + m
+    /// p + p^2)), m = max(na, nc); without missing outputs the first term is soon over.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log};
@@ -255,8 +262,8 @@ impl Default for Method {
 /// The structure follows from the orders. Bounds on static gains call the inputs `u1`, `u2`, ….
 ///
 /// # Errors
-/// [`Error::Argument`] if the record does not have the orders' inputs, or the method or initial condition is not for this
-/// structure; [`Error::Undetermined`] if there are too few samples or the data cannot determine the parameters;
+/// [`Error::Argument`] if the record does not have the orders' inputs, or the method or initial condition is not for
+/// this structure; [`Error::Undetermined`] if there are too few samples or the data cannot determine the parameters;
 /// [`Error::Data`] if squares of the signals leave the range of `f64`.
 ///
 /// ```
@@ -302,8 +309,8 @@ pub fn estimate_monitored(
     estimate_of_channels(record, &inputs, orders, method, initial, monitor)
 }
 
-/// The same with the inputs' names, which bounds on their static gains use. The last inputs may have none: those of a constant
-/// and a trend. Data that are not at hand are for a search of prediction errors.
+/// The same with the inputs' names, which bounds on their static gains use. The last inputs may have none: those of a
+/// constant and a trend. Data that are not at hand are for a search of prediction errors.
 pub(crate) fn estimate_of_channels(
     data: &impl ExperimentData,
     inputs: &[String],
@@ -361,8 +368,8 @@ pub(crate) fn estimate_of_channels(
 
 /// Estimated parameters and what is known about them.
 ///
-/// With prediction errors e(t, theta) over N samples, p parameters and n initial conditions: theta-hat minimises
-/// sum e^2, sigma^2 = sum e^2 / (N - p - n), cov = sigma^2 (sum psi psi')^-1 with psi = -de/dtheta, the initial conditions
+/// With prediction errors e(t, theta) over N samples, p parameters and n initial conditions: theta-hat minimises sum
+/// e^2, sigma^2 = sum e^2 / (N - p - n), cov = sigma^2 (sum psi psi')^-1 with psi = -de/dtheta, the initial conditions
 /// taken out (Ljung, System Identification, 2nd ed. 1999, sections 7.3 and 9.3).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
@@ -418,8 +425,8 @@ impl Estimate {
         self.noise_variance
     }
 
-    /// By how much the sum of squared errors was divided to give sigma^2: N less the parameters and the initial conditions that
-    /// were estimated. None where sigma^2 is zero.
+    /// By how much the sum of squared errors was divided to give sigma^2: N less the parameters and the initial
+    /// conditions that were estimated. None where sigma^2 is zero.
     pub fn degrees_of_freedom(&self) -> Option<usize> {
         let degrees = (self.mse * self.samples as f64 / self.noise_variance).round();
         (degrees >= 1.0 && degrees <= self.samples as f64).then_some(degrees as usize)
@@ -430,8 +437,8 @@ impl Estimate {
         self.samples
     }
 
-    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, innovations over their variances in units of
-    /// var e: the estimate of var e that makes the likelihood largest.
+    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, innovations over their variances in
+    /// units of var e: the estimate of var e that makes the likelihood largest.
     pub fn mse(&self) -> f64 {
         self.mse
     }
@@ -456,9 +463,9 @@ impl Estimate {
         &self.procedure
     }
 
-    /// What the estimate from prefiltered signals says of those that are not: their noise variance, and the covariance of the
-    /// parameters with filtered errors, which have a colour where e is white. None for convex criteria and robust
-    /// ones, but of output error.
+    /// What the estimate from prefiltered signals says of those that are not: their noise variance, and the covariance
+    /// of the parameters with filtered errors, which have a colour where e is white. None for convex criteria and
+    /// robust ones, but of output error.
     pub(crate) fn of_prefiltered(self, record: &Record<'_>, orders: &Orders, noise_variance: f64) -> Self {
         let covariance = match &self.procedure {
             Procedure::LeastSquares { .. } | Procedure::PredictionError(_) => {
@@ -485,7 +492,8 @@ impl Estimate {
         Self { covariance, noise_variance, ..self }
     }
 
-    /// Those of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and the others alike.
+    /// Those of the exact likelihood where that was made large: AIC = (2 p - 2 ln L)/N - ln 2 pi - 1, and the others
+    /// alike.
     pub fn criteria(&self) -> Criteria {
         // Those that a prior holds are no more free.
         let effective =

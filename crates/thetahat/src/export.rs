@@ -1,11 +1,13 @@
 //! Fitted models as source code for firmware: Rust and C99 that need no heap, with every number in it.
 //!
-//! [`export`] takes a [`Report`] and a [`Plan`] and gives [`Exported`]: files by their names, and what to warn of. It opens and writes none.
-//! [`export_controller`] does so with the document of a controller.
-//! What a step computes is one small program for each kind of model, in the order of operations of [`respond`](crate::respond); both languages are
-//! written from it, and so is the interpreter that makes the test vectors. So they say the same numbers, to the bit in double precision.
+//! [`export`] takes a [`Report`] and a [`Plan`] and gives [`Exported`]: files by their names, and what to warn of. It
+//! opens and writes none. [`export_controller`] does so with the document of a controller. What a step computes is one
+//! small program for each kind of model, in the order of operations of [`respond`](crate::respond); both languages are
+//! written from it, and so is the interpreter that makes the test vectors. So they say the same numbers, to the bit in
+//! double precision.
 //!
-//! A program starts at rest at the offsets. Signals are in the units of their channels: offsets and scales are in the files.
+//! A program starts at rest at the offsets. Signals are in the units of their channels: offsets and scales are in the
+//! files.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};
@@ -177,7 +179,8 @@ pub struct Plan {
     pub purpose: Purpose,
     /// The precision of all numbers.
     pub precision: Precision,
-    /// What files, types and functions are called: a lower-case letter, then lower-case letters, digits and underscores.
+    /// What files, types and functions are called: a lower-case letter, then lower-case letters, digits and
+    /// underscores.
     pub name: String,
 }
 
@@ -220,12 +223,13 @@ struct Form {
     start: String,
 }
 
-/// Writes a model as source code, and with rows of a log a test vector along them beside it: a CSV of inputs, outputs and expected
-/// results, and a program that steps along it. No rows are all rows.
+/// Writes a model as source code, and with rows of a log a test vector along them beside it: a CSV of inputs, outputs
+/// and expected results, and a program that steps along it. No rows are all rows.
 ///
 /// # Errors
-/// [`Error::Argument`] for a name that is none, and for what the model cannot be: the message says what it can; [`Error::Report`] if a
-/// number has no meaning beside its log, as an offset that is a line; [`Error::Data`] for channels or rows that the log does not have.
+/// [`Error::Argument`] for a name that is none, and for what the model cannot be: the message says what it can;
+/// [`Error::Report`] if a number has no meaning beside its log, as an offset that is a line; [`Error::Data`] for
+/// channels or rows that the log does not have.
 pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Result<Exported, Error> {
     check_name(&plan.name)?;
     let model = &report.model;
@@ -266,13 +270,15 @@ pub fn export(report: &Report, plan: &Plan, log: Option<(&Log, &[Rows])>) -> Res
     Ok(Exported { files, warnings })
 }
 
-/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController). With rows of a log there is a test
-/// vector beside it, as [`export`] has it: in each row the controller gets the measurement, and then the input that acted. A log has no set point: it goes
-/// between the highest and the lowest measurement of the rows, every 25 of them.
+/// Writes a controller as source code: C, or Rust around [`RstController`](thetahat_core::RstController). With rows of
+/// a log there is a test vector beside it, as [`export`] has it: in each row the controller gets the measurement, and
+/// then the input that acted. A log has no set point: it goes between the highest and the lowest measurement of the
+/// rows, every 25 of them.
 ///
 /// # Errors
-/// [`Error::Argument`] for a name that is none, and a plan for something else; [`Error::Report`] for coefficients that are none, and a working
-/// point that moves; [`Error::Data`] for a log of another sample time, and for channels or rows that it does not have.
+/// [`Error::Argument`] for a name that is none, and a plan for something else; [`Error::Report`] for coefficients that
+/// are none, and a working point that moves; [`Error::Data`] for a log of another sample time, and for channels or rows
+/// that it does not have.
 pub fn export_controller(
     document: &Control,
     plan: &Plan,

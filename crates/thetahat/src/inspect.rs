@@ -2,9 +2,10 @@
 //!
 //! - [`inspect()`] inspects a [`Recording`](crate::data::Recording), [`inspect_log`] at a [`Log`](crate::data::Log); an
 //!   [`InspectionPlan`] names the channels. [`PiecewiseInspection`] takes a log of any length part by part.
-//! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]), how rich the
-//!   inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they follow the output
-//!   ([`Feedback`]). What a careful reader should know of all that is a list of [`Finding`](crate::data::Finding)s.
+//! - [`Inspection`] is the document: the [`Clock`], the quality of each channel ([`ChannelQuality`], [`Saturation`]),
+//!   how rich the inputs are ([`Excitation`], [`SpectrumPoint`]), their delays ([`DelayEstimate`]), and whether they
+//!   follow the output ([`Feedback`]). What a careful reader should know of all that is a list of
+//!   [`Finding`](crate::data::Finding)s.
 //! - A [`TopicList`] says what there is in a log of topics that have clocks of their own.
 //!
 //! ```

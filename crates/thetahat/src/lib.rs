@@ -6,8 +6,8 @@
 //! A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t)
 //! ```
 //!
-//! with A, C, D, F monic in q^-1 and e white (Ljung, System Identification: Theory for the User, 2nd ed. 1999), is written as
-//! equations of its states, or is a nonlinear map of past outputs and inputs.
+//! with A, C, D, F monic in q^-1 and e white (Ljung, System Identification: Theory for the User, 2nd ed. 1999), is
+//! written as equations of its states, or is a nonlinear map of past outputs and inputs.
 //!
 //! # From a log to a model
 //!
@@ -77,11 +77,11 @@
 //! | [`export`](mod@export) | fitted models as source code for firmware |
 //! | [`figures`], [`text`] | how numbers and names are written for people |
 //!
-//! Every [`Document`] is written as JSON and read back. Every function that can fail gives an [`Error`] that says what is wrong, where,
-//! and what to do.
+//! Every [`Document`] is written as JSON and read back. Every function that can fail gives an [`Error`] that says what
+//! is wrong, where, and what to do.
 //!
-//! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`data::Record`] are counted from 0.
-//! The same input gives the same bits, whatever the number of threads.
+//! Rows of a log are counted from 1 and ranges include both ends; sample positions inside a [`data::Record`] are
+//! counted from 0. The same input gives the same bits, whatever the number of threads.
 //!
 //! The crate does not open files, print, or run without a heap. For the last see [`thetahat_core`], whose estimators a
 //! [`track::Tracker`] and a [`filter::StateFilter`] are made of.

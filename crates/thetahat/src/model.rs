@@ -1,16 +1,18 @@
 //! What a model is: its orders, its polynomials, its equations, and the form that a document stores.
 //!
-//! - [`Orders`] say how many coefficients each polynomial of A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t) has, and with that the
-//!   [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
-//! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and [`Quantity`] that follows
-//!   from them with an [`Interval`], and the [`Signal`]s it was fitted to. [`OffsetCovariance`] is what is open of their offsets.
-//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states ([`Reduced`]), in
-//!   continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one input and output.
-//!   [`StateSpaceModel`] is one that was estimated as such, with any number of outputs, [`ContinuousStateSpaceModel`] what a fitted model
-//!   is in continuous time, and [`TimeBase`] what one is converted to.
+//! - [`Orders`] say how many coefficients each polynomial of A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t) has, and
+//!   with that the [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
+//! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and
+//!   [`Quantity`] that follows from them with an [`Interval`], and the [`Signal`]s it was fitted to.
+//!   [`OffsetCovariance`] is what is open of their offsets.
+//! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states
+//!   ([`Reduced`]), in continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one
+//!   input and output. [`StateSpaceModel`] is one that was estimated as such, with any number of outputs,
+//!   [`ContinuousStateSpaceModel`] what a fitted model is in continuous time, and [`TimeBase`] what one is converted
+//!   to.
 //! - [`GreyBox`] is a model in equations as a person writes it, [`EquationsModel`] one whose parameters were estimated.
-//! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`] of [`Regressor`]s,
-//!   which may be local models, each with its [`Membership`].
+//! - [`NonlinearArxModel`] is a nonlinear map of past outputs and inputs: for each output an [`OutputMap`], a [`Map`]
+//!   of [`Regressor`]s, which may be local models, each with its [`Membership`].
 //! - [`Model`] is a model of any kind: what reports hold. [`LinearModel`] is one output of a linear one.
 //!
 //! ```

@@ -1,8 +1,10 @@
 //! Documents for people: as tables of text, and as pages.
 //!
-//! - With the feature `tables`, [`tables`] has a function for each document, which writes it as lines of text in a [`Layout`].
-//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`, `step_test_page`,
-//!   `transient_page` (of a `Transient`) and `tuning_page` make one file of HTML that loads nothing, with charts that can be zoomed.
+//! - With the feature `tables`, [`tables`] has a function for each document, which writes it as lines of text in a
+//!   [`Layout`].
+//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`,
+//!   `step_test_page`, `transient_page` (of a `Transient`) and `tuning_page` make one file of HTML that loads nothing,
+//!   with charts that can be zoomed.
 //!
 //! ```
 //! # #[cfg(feature = "tables")] {
@@ -40,7 +42,8 @@ pub use pages::{
 pub struct Layout {
     /// No line has more columns, but for one long word.
     pub width: usize,
-    /// What an argument, which messages name between backticks, is called where the text is read: `nk` is the option --nk of a command line.
+    /// What an argument, which messages name between backticks, is called where the text is read: `nk` is the option
+    /// --nk of a command line.
     pub spelled: fn(&str) -> String,
 }
 

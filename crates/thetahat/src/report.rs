@@ -1,19 +1,27 @@
 //! From a log to a document: fits, validations and comparisons of whole logs, and their pages.
 //!
-//! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended, [`PendingEvaluation`] is a
-//!   fit before its figures. [`fit_equations`] does the same for a model in equations with an [`EquationsPlan`],
-//!   [`fit_process`] for a process in continuous time with a [`ProcessPlan`], [`fit_process_to_response`] for one of a measured frequency
-//!   response, [`fit_state_space`] ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`], [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`], [`Centres`]).
-//! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than memory.
-//! - [`Experiments`] are what others hold, in other processes or on other machines, as a search for one model of all sees them; a model in
-//!   equations is found by [`fit_equations_distributed`], whose questions get an [`answer_equations`].
-//! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and its figures.
-//! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a [`Validation`] with
-//!   [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the [`Signals`] for charts ([`OutputSignals`]).
+//! - [`identify`] fits what a [`Plan`] says and gives a [`Report`]; [`identify_monitored`] can be watched and ended,
+//!   [`PendingEvaluation`] is a fit before its figures. [`fit_equations`] does the same for a model in equations with
+//!   an [`EquationsPlan`], [`fit_process`] for a process in continuous time with a [`ProcessPlan`],
+//!   [`fit_process_to_response`] for one of a measured frequency response, [`fit_state_space`]
+//!   ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`],
+//!   [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`],
+//!   [`Centres`]).
+//! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than
+//!   memory.
+//! - [`Experiments`] are what others hold, in other processes or on other machines, as a search for one model of all
+//!   sees them; a model in equations is found by [`fit_equations_distributed`], whose questions get an
+//!   [`answer_equations`].
+//! - [`Report`] is the JSON document of a fit: its [`Data`] ([`Parts`], [`Missing`]), the model, its [`Estimation`] and
+//!   its figures.
+//! - [`validate`] tests a report on a log as a [`ValidationPlan`] says. It gives a [`Validated`]: the document, a
+//!   [`Validation`] with [`NoiseLevel`], [`Coverage`] and whether the fit has [`InSample`] the rows, and the
+//!   [`Signals`] for charts ([`OutputSignals`]).
 //! - [`Report::reduced`] is a report of a model with fewer states.
-//! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] (a [`Demand`] of an output or of all) makes a gate of a validation.
-//! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from it.
-//!   [`held_out_runs`] are the free runs of the models between which a choice was made.
+//! - [`compare`] puts several validations side by side in a [`Comparison`]. A [`Requirement`] (a [`Demand`] of an
+//!   output or of all) makes a gate of a validation.
+//! - [`apply`] predicts or simulates a log with a stored model ([`Applied`], [`AppliedOutput`]), [`sample`] draws from
+//!   it. [`held_out_runs`] are the free runs of the models between which a choice was made.
 //!
 //! ```
 //! use thetahat::Document;

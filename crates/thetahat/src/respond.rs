@@ -1,14 +1,18 @@
 //! How a model responds: to a record of inputs and outputs, to steps, to impulses and to each frequency.
 //!
-//! - [`predict`] gives the k-step prediction, [`simulate`] the free run, which sees the inputs alone; [`InitialCondition`] says what they start
-//!   from. [`forecast`] goes on after the last sample of a record.
-//! - [`prediction_deviation`] is how far predictions are off because of the noise, [`prediction_deviations`] what uncertain parameters
-//!   add to that. [`draw`] gives random free runs and forecasts of models that the data do not tell apart.
-//! - [`step_response`] and [`impulse_response`] are those in time, [`frequency_response`] that to sines, with standard errors.
-//! - [`Horizon`] says how far ahead a figure looks, [`NisSummary`] whether the errors of a filter are as large as it expects.
+//! - [`predict`] gives the k-step prediction, [`simulate`] the free run, which sees the inputs alone;
+//!   [`InitialCondition`] says what they start from. [`forecast`] goes on after the last sample of a record.
+//! - [`prediction_deviation`] is how far predictions are off because of the noise, [`prediction_deviations`] what
+//!   uncertain parameters add to that. [`draw`] gives random free runs and forecasts of models that the data do not
+//!   tell apart.
+//! - [`step_response`] and [`impulse_response`] are those in time, [`frequency_response`] that to sines, with standard
+//!   errors.
+//! - [`Horizon`] says how far ahead a figure looks, [`NisSummary`] whether the errors of a filter are as large as it
+//!   expects.
 //!
-//! All of these take and give deviations from the model's offsets. [`report::apply`](crate::report::apply) takes a whole log, with
-//! its offsets. The sources are named at each function; most are Ljung, System Identification, 2nd ed. 1999, chapters 2 and 3.
+//! All of these take and give deviations from the model's offsets. [`report::apply`](crate::report::apply) takes a
+//! whole log, with its offsets. The sources are named at each function; most are Ljung, System Identification, 2nd ed.
+//! 1999, chapters 2 and 3.
 //!
 //! ```
 //! use thetahat::data::Record;

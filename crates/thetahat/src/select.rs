@@ -1,12 +1,12 @@
 //! Which of several models to believe.
 //!
 //! - [`choose_orders`] compares the models of a [`Choice`] on the same samples and gives a [`Selection`].
-//! - [`Choice`] is a model that is known, a [`Grid`] of [`OrderRange`]s that is walked along a [`Path`], or [`Automatic`]: structures and
-//!   orders that the data suggest.
-//! - [`Select`] is what makes one model better: an information criterion, or errors on samples that it was not fitted to
-//!   ([`HeldOut`]). [`Focus`] is what the model is for.
-//! - [`Selection`] has every model that was compared ([`Candidate`], [`ProcessCandidate`], [`StateSpaceCandidate`]), the winners
-//!   ([`Best`]) and the delays ([`Delay`], [`DelayScore`]).
+//! - [`Choice`] is a model that is known, a [`Grid`] of [`OrderRange`]s that is walked along a [`Path`], or
+//!   [`Automatic`]: structures and orders that the data suggest.
+//! - [`Select`] is what makes one model better: an information criterion, or errors on samples that it was not fitted
+//!   to ([`HeldOut`]). [`Focus`] is what the model is for.
+//! - [`Selection`] has every model that was compared ([`Candidate`], [`ProcessCandidate`], [`StateSpaceCandidate`]),
+//!   the winners ([`Best`]) and the delays ([`Delay`], [`DelayScore`]).
 //!
 //! ```
 //! use thetahat::data::Record;

@@ -1,9 +1,9 @@
 //! Frequency responses from data, without a model.
 //!
-//! - [`spectrum()`] estimates the response of a [`Log`](crate::data::Log) from its inputs to its output, as a [`SpectrumPlan`] says: by a
-//!   [`Method`] ([`Estimator`]) at some [`Frequencies`].
-//! - [`MeasuredResponse`] is the document: points with covariance, noise and coherence ([`NoisePoint`]), and whether the bands are honest
-//!   ([`BandQuality`]). It can be compared with a model ([`Agreement`]).
+//! - [`spectrum()`] estimates the response of a [`Log`](crate::data::Log) from its inputs to its output, as a
+//!   [`SpectrumPlan`] says: by a [`Method`] ([`Estimator`]) at some [`Frequencies`].
+//! - [`MeasuredResponse`] is the document: points with covariance, noise and coherence ([`NoisePoint`]), and whether
+//!   the bands are honest ([`BandQuality`]). It can be compared with a model ([`Agreement`]).
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};

@@ -1,10 +1,11 @@
 //! Step tests: what a course reads off the response to a step by hand, with the spread of each way.
 //!
-//! - [`step_test()`] finds the steps of an input in a [`Log`](crate::data::Log), as a [`StepTestPlan`] says, and evaluates each response.
+//! - [`step_test()`] finds the steps of an input in a [`Log`](crate::data::Log), as a [`StepTestPlan`] says, and
+//!   evaluates each response.
 //! - [`sine_test`] reads the time constant off a measured frequency response, where its phase is -45 degrees.
-//! - [`StepTest`] is the document: each [`Step`] with its [`StepResponse`], a list of [`StepEstimate`]s (a [`StepFigure`] by a
-//!   [`StepMethod`]), and their [`StepSummary`] over the steps, beside the [`FittedProcess`] of least squares. [`Shape`] says which
-//!   picture fits.
+//! - [`StepTest`] is the document: each [`Step`] with its [`StepResponse`], a list of [`StepEstimate`]s (a
+//!   [`StepFigure`] by a [`StepMethod`]), and their [`StepSummary`] over the steps, beside the [`FittedProcess`] of
+//!   least squares. [`Shape`] says which picture fits.
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};

@@ -1,10 +1,12 @@
 //! Models that are estimated while the plant runs, row by row.
 //!
-//! - [`Tracker`] estimates an ARX, ARMAX or nonlinear ARX model, predicts, and raises alarms where the plant changes. Each row gives a [`Tracked`].
-//!   Several outputs are as many trackers ([`Tracker::coupled`]), of which [`forecasts`] are made at once.
-//! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`TrackStart`], and numbers for each channel
-//!   ([`PerChannel`]).
-//! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the document of a run.
+//! - [`Tracker`] estimates an ARX, ARMAX or nonlinear ARX model, predicts, and raises alarms where the plant changes.
+//!   Each row gives a [`Tracked`]. Several outputs are as many trackers ([`Tracker::coupled`]), of which [`forecasts`]
+//!   are made at once.
+//! - [`TrackPlan`] says how: the [`TrackMethod`], a [`Policy`] of forgetting, a [`TrackStart`], and numbers for each
+//!   channel ([`PerChannel`]).
+//! - [`TrackScore`] says how well it predicted so far, [`TrackerSummary`] what it knows, [`TrackSummary`] is the
+//!   document of a run.
 //! - [`change_detector`] makes a detector with a mean number of samples between false alarms.
 //!
 //! The estimators, with equations and sources, are in [`thetahat_core`].

@@ -1,7 +1,7 @@
 //! PI and PID settings for a process, and the loop that they give.
 //!
-//! - [`tune`] gives a [`Tuning`], the document: for each [`Rule`] and [`Controller`] the settings, and what the loop with the fitted
-//!   process does with them ([`ClosedLoop`]).
+//! - [`tune`] gives a [`Tuning`], the document: for each [`Rule`] and [`Controller`] the settings, and what the loop
+//!   with the fitted process does with them ([`ClosedLoop`]).
 //!
 //! Controllers are of the ideal form with the derivative filtered:
 //!

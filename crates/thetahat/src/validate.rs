@@ -1,8 +1,8 @@
 //! How good a model is on a record: figures of fit, and tests of what is left.
 //!
 //! - [`Fit`] says how close a response comes to the measured output, and what the rows served for ([`Part`]).
-//! - [`Residuals`] are tests of the one-step errors: whether they are white (Ljung and Box 1978, a [`Test`]; [`Anderson`] with its
-//!   [`AndersonLevel`]s), and whether they depend on an input ([`Independence`]).
+//! - [`Residuals`] are tests of the one-step errors: whether they are white (Ljung and Box 1978, a [`Test`];
+//!   [`Anderson`] with its [`AndersonLevel`]s), and whether they depend on an input ([`Independence`]).
 //!
 //! [`report::validate`](crate::report::validate) makes all of them for a model and a log:
 //!

@@ -1,7 +1,8 @@
-//! What holds over many simulated logs: intervals cover the truth, hard cases are found from the default start, and the true
-//! structure and orders are chosen with nothing asked for.
+//! What holds over many simulated logs: intervals cover the truth, hard cases are found from the default start, and the
+//! true structure and orders are chosen with nothing asked for.
 //!
-//! `make monte-carlo` does the full numbers. `MONTE_CARLO` is the number of runs of each kind; without it they are fewer.
+//! `make monte-carlo` does the full numbers. `MONTE_CARLO` is the number of runs of each kind; without it they are
+//! fewer.
 
 #[path = "monte_carlo/design.rs"]
 mod design;
@@ -101,8 +102,8 @@ fn intervals_of_output_error_cover_the_truth_in_coloured_noise() {
     );
 }
 
-/// Plants with lightly damped modes at these angles, all excited alike: how many seeds lead to the minimum that is found
-/// from the true parameters as well.
+/// Plants with lightly damped modes at these angles, all excited alike: how many seeds lead to the minimum that is
+/// found from the true parameters as well.
 fn assert_found(angles: &[f64]) {
     let (runs, samples, radius) = (runs(20).min(100), 2000, 0.995_f64);
     let mode = |angle: f64| [1.0, -2.0 * radius * angle.cos(), radius * radius];
@@ -169,8 +170,8 @@ fn three_modes_are_found() {
     assert_found(&[0.05, 0.1, 0.2]);
 }
 
-/// A random plant B/F with one delay: real poles, or a pair of them, of modulus 0.4 to 0.9, and a zero that lies away from
-/// them.
+/// A random plant B/F with one delay: real poles, or a pair of them, of modulus 0.4 to 0.9, and a zero that lies away
+/// from them.
 fn random_plant(random: &mut Random) -> [Vec<f64>; 2] {
     loop {
         let f = if random.uniform() < 0.5 {

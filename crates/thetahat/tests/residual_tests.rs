@@ -128,8 +128,8 @@ fn assert_levels(kind: &Kind<'_>, white: bool) {
         let name = |test: &str| format!("{}, {part}, {test}", kind.name);
         if white {
             assert_inside(&name("Ljung-Box"), rates.ljung_box, 2.0, 8.0);
-            // On fresh rows the errors of the parameters come on top, which its bands see one by one: of 2000 true Box-Jenkins
-            // models it turns away 9.1 %.
+            // On fresh rows the errors of the parameters come on top, which its bands see one by one: of 2000 true
+            // Box-Jenkins models it turns away 9.1 %.
             let most = if part == "fresh" { 9.5 } else { 8.0 };
             for rate in rates.anderson {
                 assert_inside(&name("Anderson"), rate, 0.0, most);

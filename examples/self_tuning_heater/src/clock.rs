@@ -1,5 +1,5 @@
-//! Embassy's clock on the timer that every Cortex-M has. A board's own crate (embassy-stm32, embassy-rp, …) brings a better one,
-//! and this file goes.
+//! Embassy's clock on the timer that every Cortex-M has. A board's own crate (embassy-stm32, embassy-rp, …) brings a
+//! better one, and this file goes.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -12,8 +12,8 @@ use embassy_time_queue_utils::Queue;
 
 /// The processor of the emulator's machine, in Hz.
 const PROCESSOR: u32 = 25_000_000;
-/// How much faster the clock goes than it should: nobody waits for a simulated heater. (At twice this some samples are not computed
-/// in time.)
+/// How much faster the clock goes than it should: nobody waits for a simulated heater. (At twice this some samples are
+/// not computed in time.)
 const SPEED_UP: u32 = 500;
 
 struct Clock {

@@ -1,7 +1,7 @@
 #![no_std]
 #![no_main]
-//! A heater that learns its plant and designs its controller for it. One task samples and controls, the other one changes the set
-//! point and judges.
+//! A heater that learns its plant and designs its controller for it. One task samples and controls, the other one
+//! changes the set point and judges.
 
 mod clock;
 mod heater;

@@ -35,24 +35,15 @@ type Range = Option<(Option<f64>, Option<f64>)>;
 /// ValueError
 ///     If a polynomial does not begin with 1, a number is not finite, or limits are out of order.
 ///
-/// Notes
-/// -----
-/// Signals are deviations from a working point at which they belong together: any, if R has the factor 1 - q^-1. What the actuator did not
-/// do is told to the controller by itself: A_o v = T u_c - S y + (A_o - R) u.
+/// Notes ----- Signals are deviations from a working point at which they belong together: any, if R has the factor 1 -
+/// q^-1. What the actuator did not do is told to the controller by itself: A_o v = T u_c - S y + (A_o - R) u.
 ///
-/// References
-/// ----------
-/// Åström and Wittenmark, Adaptive Control, 2nd ed., 1995, section 3.2; Computer-Controlled Systems, 3rd ed., 1997, section 9.4.
+/// References ---------- Åström and Wittenmark, Adaptive Control, 2nd ed., 1995, section 3.2; Computer-Controlled
+/// Systems, 3rd ed., 1997, section 9.4.
 ///
-/// Examples
-/// --------
-/// >>> from thetahat import RstController
-/// >>> heater = RstController.pole_placement([1, -0.9], [0, 0.2], [1, -0.6], [1, -0.3], integrator=True, limits=(0.0, 10.0))
-/// >>> level = power = 0.0
-/// >>> for _ in range(100):
-/// ...     level = 0.9 * level + 0.2 * power
-/// ...     power = heater.control(5.0, level)
-/// >>> round(level, 6), round(power, 6)
+/// Examples -------- >>> from thetahat import RstController >>> heater = RstController.pole_placement([1, -0.9], [0,
+/// 0.2], [1, -0.6], [1, -0.3], integrator=True, limits=(0.0, 10.0)) >>> level = power = 0.0 >>> for _ in range(100):
+/// ... level = 0.9 * level + 0.2 * power ... power = heater.control(5.0, level) >>> round(level, 6), round(power, 6)
 /// (5.0, 2.5)
 #[pyclass(module = "thetahat")]
 pub(crate) struct RstController {
@@ -128,8 +119,8 @@ impl RstController {
     /// Raises
     /// ------
     /// ValueError
-    ///     If A and B have a common factor, a zero that shall be cancelled is not inside the unit circle, the input acts at once, there are
-    ///     more poles than the controller has coefficients, or a number is not finite.
+    ///     If A and B have a common factor, a zero that shall be cancelled is not inside the unit circle, the input
+    ///     acts at once, there are more poles than the controller has coefficients, or a number is not finite.
     #[staticmethod]
     #[pyo3(signature = (a, b, response, observer = None, *, integrator = false, cancel_zeros = false, limits = None))]
     #[pyo3(
@@ -202,7 +193,8 @@ impl RstController {
         Ok(())
     }
 
-    /// How far the loop with a model is from instability: the largest abs(1/(1 + L)) and abs(L/(1 + L)) with L = B S/(A R).
+    /// How far the loop with a model is from instability: the largest abs(1/(1 + L)) and abs(L/(1 + L)) with L = B S/(A
+    /// R).
     ///
     /// Parameters
     /// ----------

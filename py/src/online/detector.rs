@@ -172,25 +172,22 @@ pub(crate) struct Engine {
 /// ValueError
 ///     If a number is out of its range.
 ///
-/// Notes
-/// -----
-/// As long as a model is right, its normalised innovation z = e/sqrt(S) is white, with mean 0 and variance 1. Each chart is the
-/// cumulative sum of a log-likelihood ratio, for the change that it is to find, held above 0::
+/// Notes ----- As long as a model is right, its normalised innovation z = e/sqrt(S) is white, with mean 0 and
+/// variance 1. Each chart is the cumulative sum of a log-likelihood ratio, for the change that it is to find, held
+/// above 0::
 ///
 ///     mean up       g <- max(0, g + z - 1/2)               a mean of 1 (in standard deviations) against 0
 ///     mean down     g <- max(0, g - z - 1/2)               a mean of -1 against 0
 ///     variance      g <- max(0, g + (z^2/2 - ln 2)/2)      a variance of 2 against 1
 ///
-/// and an alarm is given where g exceeds its threshold; then that chart starts again from 0. With m > 1 outputs only the
-/// variance is watched, by the normalised square of the innovation: g <- max(0, g + (nis/2 - m ln 2)/2).
+/// and an alarm is given where g exceeds its threshold; then that chart starts again from 0. With m > 1 outputs only
+/// the variance is watched, by the normalised square of the innovation: g <- max(0, g + (nis/2 - m ln 2)/2).
 ///
-/// The thresholds follow from the interval for Gaussian innovations: with one output half of the false alarms are from the
-/// charts of the mean, half from that of the variance. Outliers and heavy tails give more.
+/// The thresholds follow from the interval for Gaussian innovations: with one output half of the false alarms are from
+/// the charts of the mean, half from that of the variance. Outliers and heavy tails give more.
 ///
-/// References
-/// ----------
-/// Page, Continuous inspection schemes, Biometrika 41, 1954. Basseville and Nikiforov, Detection of Abrupt Changes, 1993,
-/// sections 2.2 and 2.6.
+/// References ---------- Page, Continuous inspection schemes, Biometrika 41, 1954. Basseville and Nikiforov, Detection
+/// of Abrupt Changes, 1993, sections 2.2 and 2.6.
 ///
 /// Examples
 /// --------

@@ -31,8 +31,8 @@ use crate::array;
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
 /// release : int, default 0
-///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0 is a
-///     gate that never lets go: it may lock the filter out for ever.
+///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0
+///     is a gate that never lets go: it may lock the filter out for ever.
 /// iterations : int, default 1
 ///     How often a correction linearises the observation, each time about its last result.
 ///
@@ -83,8 +83,8 @@ struct Extended<'a, T, O> {
 }
 
 impl<T, O> Extended<'_, T, O> {
-    /// What was answered, unless a function went wrong: a noise that it did not give does not show in the answer. The error
-    /// gives way to what the function said.
+    /// What was answered, unless a function went wrong: a noise that it did not give does not show in the answer. The
+    /// error gives way to what the function said.
     fn checked<A>(&self, answer: Result<A, Error>) -> Result<A, Error> {
         if (self.troubled)(self.transition, self.observation) { Err(Error::Overflow) } else { answer }
     }

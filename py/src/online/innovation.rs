@@ -22,10 +22,10 @@ use crate::array;
 /// nis : float
 ///     The normalised innovation squared, e' S^-1 e. 0 if nothing was measured, or the variance is not known.
 /// action : str
-///     "updated"; "capped": updated, and a variance at its bound, where nothing is forgotten; "projected": updated by a shorter
-///     step; "missing"; "not ready": the delay lines are not filled; "collecting": there is no estimate yet;
-///     "frozen": adaptation is off; "skipped": in the dead zone; "gated": above the gate;
-///     "released": above it too, but used, as so many before it were; "bounded": an outlier, which corrects by less than it asks for.
+///     "updated"; "capped": updated, and a variance at its bound, where nothing is forgotten; "projected": updated by a
+///     shorter step; "missing"; "not ready": the delay lines are not filled; "collecting": there is no estimate yet;
+///     "frozen": adaptation is off; "skipped": in the dead zone; "gated": above the gate; "released": above it too, but
+///     used, as so many before it were; "bounded": an outlier, which corrects by less than it asks for.
 /// log_likelihood : float
 ///     -1/2 (m ln 2 pi + ln det S + e' S^-1 e) for the m elements measured; 0 if nothing was measured.
 ///

@@ -33,8 +33,8 @@ use crate::work::Pulse;
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
 /// release : int, default 0
-///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0 is a
-///     gate that never lets go: it may lock the filter out for ever.
+///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0
+///     is a gate that never lets go: it may lock the filter out for ever.
 ///
 /// Raises
 /// ------

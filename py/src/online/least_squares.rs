@@ -53,14 +53,14 @@ impl<N: Dimension + Dimension<M>, M: Dimension> Around<N, M> for Stepper<f64, N,
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size corrects nothing.
 /// huber : float, default inf
-///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
-///     3 loses next to nothing where there are no outliers.
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the
+///     action is "bounded". 3 loses next to nothing where there are no outliers.
 /// gate : float, default inf
-///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
-///     deviations. Huber's bound or a gate, not both.
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated".
+///     25 is five standard deviations. Huber's bound or a gate, not both.
 /// release : int, default 0
-///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
-///     but for what the noise variance learns of them.
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it
+///     again. 0 is never, but for what the noise variance learns of them.
 ///
 /// Raises
 /// ------

@@ -30,8 +30,8 @@ use crate::model::Model;
 /// degree : int, default 2
 ///     All products of at most so many regressors are terms, if ``terms`` does not say them.
 /// terms : sequence of sequences of int, optional
-///     The regressors that each term is the product of, counted from 0 in the order y(k-1) ..., u(k-nk) ... of the first input, and of
-///     the next; an empty one is the constant.
+///     The regressors that each term is the product of, counted from 0 in the order y(k-1) ..., u(k-nk) ... of the
+///     first input, and of the next; an empty one is the constant.
 /// output_offset, output_scale : float, default 0.0 and 1.0
 ///     The level of the output and its typical deviation from it, in its own unit.
 /// input_offsets, input_scales : float or array_like, optional
@@ -47,14 +47,14 @@ use crate::model::Model;
 /// dead_zone : float, default 0.0
 ///     An innovation of at most this size, in the unit of the output, corrects nothing.
 /// huber : float, default inf
-///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
-///     3 loses next to nothing where there are no outliers.
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the
+///     action is "bounded". 3 loses next to nothing where there are no outliers.
 /// gate : float, default inf
-///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
-///     deviations. Huber's bound or a gate, not both.
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated".
+///     25 is five standard deviations. Huber's bound or a gate, not both.
 /// release : int, default 0
-///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
-///     but for what the noise variance learns of them.
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it
+///     again. 0 is never, but for what the noise variance learns of them.
 /// limits : sequence, optional
 ///     A pair (lower, upper) or None for each parameter.
 ///
@@ -65,7 +65,8 @@ use crate::model::Model;
 ///     y(k) = offset + scale (theta_1 f_1(z) + theta_2 f_2(z) + ... + e(k))
 ///     z = the lags, each as (x - offset) / scale
 ///
-/// with f_j the terms, so that parameters have no unit. Those that `narx` fits start it in the same units: `from_model` does so.
+/// with f_j the terms, so that parameters have no unit. Those that `narx` fits start it in the same units: `from_model`
+/// does so.
 ///
 /// References
 /// ----------
@@ -176,7 +177,8 @@ impl RecursiveNarx {
         RecursiveModel::new(py, Stepper::Narx(stepper), inputs.len(), &given).map(Self::over)
     }
 
-    /// Start from a fitted nonlinear ARX model: its functions, whatever they are, scales, offsets, parameters and covariance.
+    /// Start from a fitted nonlinear ARX model: its functions, whatever they are, scales, offsets, parameters and
+    /// covariance.
     ///
     /// Parameters
     /// ----------
@@ -286,8 +288,8 @@ impl RecursiveNarx {
         found.map_err(|error| failed(py, error))
     }
 
-    /// The slopes of the output along each regressor there: the Jacobian of g, a row of the state matrix of an extended Kalman filter
-    /// whose states are the lags.
+    /// The slopes of the output along each regressor there: the Jacobian of g, a row of the state matrix of an extended
+    /// Kalman filter whose states are the lags.
     ///
     /// Parameters
     /// ----------

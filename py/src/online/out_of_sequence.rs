@@ -15,9 +15,9 @@ use crate::array;
 
 /// A Kalman filter, extended or not, that takes a measurement of some samples ago.
 ///
-/// An analysis in a laboratory, a camera, a sensor behind a slow bus: what they tell is of an earlier sample. The filter keeps the last
-/// samples, puts a late element in its place and runs again from there: the result is the same to the bit as if it had come in
-/// time.
+/// An analysis in a laboratory, a camera, a sensor behind a slow bus: what they tell is of an earlier sample. The
+/// filter keeps the last samples, puts a late element in its place and runs again from there: the result is the same to
+/// the bit as if it had come in time.
 ///
 /// Parameters
 /// ----------
@@ -38,16 +38,13 @@ use crate::array;
 /// iterations : int, default 1
 ///     How often a correction linearises the observation.
 ///
-/// Notes
-/// -----
-/// The models are arguments, linear or not, as for `ExtendedKalmanFilter`; for a late measurement they must be those of all the samples
-/// since. (A function without its Jacobian is differenced by steps of the deviations that the states have now: then the result
-/// is the same but for the error of the differences.)
+/// Notes ----- The models are arguments, linear or not, as for `ExtendedKalmanFilter`; for a late measurement they must
+/// be those of all the samples since. (A function without its Jacobian is differenced by steps of the deviations that
+/// the states have now: then the result is the same but for the error of the differences.)
 ///
-/// References
-/// ----------
-/// Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a discrete-time Kalman filter, 1998.
-/// Bar-Shalom, Update with out-of-sequence measurements in tracking: exact solution, 2002.
+/// References ---------- Larsen, Andersen, Ravn and Poulsen, Incorporation of time delayed measurements in a
+/// discrete-time Kalman filter, 1998. Bar-Shalom, Update with out-of-sequence measurements in tracking: exact solution,
+/// 2002.
 ///
 /// Examples
 /// --------
@@ -148,8 +145,8 @@ impl OutOfSequenceFilter {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a shape is wrong, a number too large, an element has come before, or a function returns NaN or infinity. Nothing has
-    ///     changed then.
+    ///     If a shape is wrong, a number too large, an element has come before, or a function returns NaN or infinity.
+    ///     Nothing has changed then.
     #[pyo3(signature = (observation, measurement, *, input = None))]
     fn correct(
         &mut self,
@@ -194,7 +191,8 @@ impl OutOfSequenceFilter {
     /// Raises
     /// ------
     /// ValueError
-    ///     If `age` is too large or not above 0, an element has come before, or as for `correct`. Nothing has changed then.
+    ///     If `age` is too large or not above 0, an element has come before, or as for `correct`. Nothing has changed
+    ///     then.
     fn correct_late(
         &mut self,
         py: Python<'_>,

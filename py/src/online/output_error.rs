@@ -14,8 +14,8 @@ use super::recursive_model::{
 
 /// A model with noise of the sensor, estimated while the plant runs.
 ///
-/// Noise of the sensor, white or coloured, biases an ARX model; here it does not, as long as the input is independent of it: not in a
-/// closed loop.
+/// Noise of the sensor, white or coloured, biases an ARX model; here it does not, as long as the input is independent
+/// of it: not in a closed loop.
 ///
 /// Parameters
 /// ----------
@@ -28,10 +28,10 @@ use super::recursive_model::{
 /// forgetting : float, Forgetting or None, default 0.99
 ///     How old samples are forgotten. A float is exponential forgetting with that factor, None is no forgetting.
 /// method : {"prediction-error", "instruments"}
-///     The first one goes along the gradient of the model's output: it converges to a minimum of the variance of the output
-///     error, the best estimate where the noise is white, with honest standard errors then. The second one is instrumental variables
-///     from the model's own output: linear in the parameters, so that there is one minimum; the variance of the noise and
-///     standard errors are not known.
+///     The first one goes along the gradient of the model's output: it converges to a minimum of the variance of the
+///     output error, the best estimate where the noise is white, with honest standard errors then. The second one is
+///     instrumental variables from the model's own output: linear in the parameters, so that there is one minimum; the
+///     variance of the noise and standard errors are not known.
 /// constant : bool, default False
 ///     Whether a constant is estimated too, for signals that are not about 0: the level of the output where the inputs
 ///     are 0 is constant / F(1).
@@ -46,15 +46,15 @@ use super::recursive_model::{
 /// dead_zone : float, default 0.0
 ///     An error of at most this size corrects nothing.
 /// huber : float, default inf
-///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
-///     3 loses next to nothing where there are no outliers.
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the
+///     action is "bounded". 3 loses next to nothing where there are no outliers.
 /// gate : float, default inf
-///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
-///     deviations. Huber's bound or a gate, not both; with the method "instruments"
-///     neither, as the noise variance is not known.
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated".
+///     25 is five standard deviations. Huber's bound or a gate, not both; with the method "instruments" neither, as the
+///     noise variance is not known.
 /// release : int, default 0
-///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
-///     but for what the noise variance learns of them.
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it
+///     again. 0 is never, but for what the noise variance learns of them.
 /// limits : sequence, optional
 ///     A pair (lower, upper) or None for each parameter, as for `RecursiveArx`.
 ///
@@ -66,8 +66,8 @@ use super::recursive_model::{
 ///     y(k) = x(k) + e(k)
 ///     F(q) = 1 + f_1 q^-1 + ... + f_nf q^-nf
 ///
-/// F stays stable: a step that would lead out is shortened, and the action is "projected". A missing output corrects nothing, and the
-/// model's own output goes on.
+/// F stays stable: a step that would lead out is shortened, and the action is "projected". A missing output corrects
+/// nothing, and the model's own output goes on.
 ///
 /// References
 /// ----------

@@ -270,8 +270,8 @@ impl RecursiveModel {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row` takes
-    ///     that. Nothing has changed then, time included.
+    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row`
+    ///     takes that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
         let innovation = self.engine.measured(output).map_err(|error| failed(py, error))?;
@@ -379,8 +379,9 @@ impl RecursiveModel {
     /// Parameters
     /// ----------
     /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
-    ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be chosen;
-    ///     after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then, but is there.)
+    ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be
+    ///     chosen; after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then,
+    ///     but is there.)
     /// steps : int, optional
     ///     How many; it is needed without input only.
     ///

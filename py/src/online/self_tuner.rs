@@ -23,11 +23,13 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 /// Parameters
 /// ----------
 /// na, nb : int
-///     The orders of the model. 2 coefficients of B for a plant of second order, and one more for each sample of dead time that there may be.
+///     The orders of the model. 2 coefficients of B for a plant of second order, and one more for each sample of dead
+///     time that there may be.
 /// nc : int, default 0
 ///     The order of C: above 0 where the noise is not white. Then C is a factor of the observer's polynomial.
 /// frequency : float
-///     The natural frequency of the response that is wanted, in rad a sample: it settles in about 4 / (damping frequency) samples.
+///     The natural frequency of the response that is wanted, in rad a sample: it settles in about 4 / (damping
+///     frequency) samples.
 /// damping : float, default 0.8
 ///     Its damping, above 0 and at most 1.
 /// observer : float, default 0.3
@@ -47,7 +49,8 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 /// integrator : bool, default True
 ///     Whether the controller integrates.
 /// probing : (first, largest), optional
-///     The amplitudes with which the plant is excited until there is a controller: a tenth of the input's scale, doubled up to twice.
+///     The amplitudes with which the plant is excited until there is a controller: a tenth of the input's scale,
+///     doubled up to twice.
 /// sensor_range : (lower, upper), optional
 ///     What the sensor can measure. What is beyond is taken as the end of the range.
 /// stuck_after : int, default 0
@@ -56,7 +59,8 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 ///     What acts while the tuner is not trusted: the mean input of the latest 64 sound samples, the controller of
 ///     these, or this input.
 /// excitation : float, optional
-///     The amplitude that excites the plant then: a tenth of the input's scale. With 0 trust may not come back by itself.
+///     The amplitude that excites the plant then: a tenth of the input's scale. With 0 trust may not come back by
+///     itself.
 /// start : {"standard", "exact"}, default "standard"
 ///     As for `RecursiveLeastSquares`; only "standard" with `nc` above 0.
 ///
@@ -65,37 +69,31 @@ type Stepper = IndirectSelfTuner<f64, Dyn, Dyn, RecursiveArmax<f64, Dyn>>;
 /// ValueError
 ///     For a setting out of its range.
 ///
-/// Notes
-/// -----
-/// The model is A y = B u + constant + C e, and the closed loop has the poles A_m A_o of the response that is wanted, with
-/// A_o = C (1 - observer q^-1). Noise that is not white biases the model with `nc` = 0; with it, the noise passes through the loop without the
-/// factor C. It takes more samples to know more parameters: where the noise is nearly white, `nc` = 0 is better.
+/// Notes ----- The model is A y = B u + constant + C e, and the closed loop has the poles A_m A_o of the response that
+/// is wanted, with A_o = C (1 - observer q^-1). Noise that is not white biases the model with `nc` = 0; with it, the
+/// noise passes through the loop without the factor C. It takes more samples to know more parameters: where the noise
+/// is nearly white, `nc` = 0 is better.
 ///
-/// A measurement that is NaN is missing: the controller goes on with what its model predicts, for 100 samples, and then holds the input. A design is taken
-/// only where the peaks of its sensitivities with the model are below 2; slower responses are tried in turn, and the last good controller
-/// stays otherwise.
+/// A measurement that is NaN is missing: the controller goes on with what its model predicts, for 100 samples, and then
+/// holds the input. A design is taken only where the peaks of its sensitivities with the model are below 2; slower
+/// responses are tried in turn, and the last good controller stays otherwise.
 ///
 /// Where designs are refused for long, the input goes from limit to limit, or the model predicts worse than the latest
 /// measurement does, the tuner is not trusted: `distrust` says why, the fallback acts (the last controller, where it is
 /// only old), and the model goes on learning. It controls again by itself where that makes it good again; a sign that
 /// is wrong is given anew by `set_gain_sign`.
 ///
-/// The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up to the limits.
+/// The margins are those with the model: where the plant is of a higher order, disturbances can make the loop burst up
+/// to the limits.
 ///
 /// References
 /// ----------
 /// Åström and Wittenmark, Adaptive Control, 2nd ed., 1995, section 3.4 and chapter 11.
 ///
-/// Examples
-/// --------
-/// >>> from thetahat import SelfTuner
-/// >>> tuner = SelfTuner(1, 2, frequency=0.3, limits=(0.0, 100.0), input=20.0, output_scale=50.0, input_scale=10.0, gain_sign=1)
-/// >>> temperature, power = 20.0, 20.0
-/// >>> for _ in range(300):
-/// ...     temperature = 0.95 * temperature + 0.08 * power + 0.5
-/// ...     power = tuner.control(60.0, temperature)
-/// >>> tuner.state, round(temperature, 3)
-/// ('controlling', 60.0)
+/// Examples -------- >>> from thetahat import SelfTuner >>> tuner = SelfTuner(1, 2, frequency=0.3, limits=(0.0, 100.0),
+/// input=20.0, output_scale=50.0, input_scale=10.0, gain_sign=1) >>> temperature, power = 20.0, 20.0 >>> for _ in
+/// range(300): ... temperature = 0.95 * temperature + 0.08 * power + 0.5 ... power = tuner.control(60.0,
+/// temperature) >>> tuner.state, round(temperature, 3) ('controlling', 60.0)
 #[pyclass(module = "thetahat")]
 pub(crate) struct SelfTuner {
     pub(super) tuner: Stepper,
@@ -221,8 +219,8 @@ impl SelfTuner {
         self.tuner.applied(u);
     }
 
-    /// Excite the plant around what the controller wants: u = share u_c + (1 - share) u_f, u_c being u_f plus or minus the largest amplitude of
-    /// probing.
+    /// Excite the plant around what the controller wants: u = share u_c + (1 - share) u_f, u_c being u_f plus or minus
+    /// the largest amplitude of probing.
     ///
     /// Parameters
     /// ----------
@@ -283,8 +281,8 @@ impl SelfTuner {
         self.tuner.design_age()
     }
 
-    /// What it did in the latest sample: "probing", "controlling", "bridging" a silent sensor with the model, "holding" the
-    /// input, or "distrusted": the fallback acts, or a controller that is old.
+    /// What it did in the latest sample: "probing", "controlling", "bridging" a silent sensor with the model, "holding"
+    /// the input, or "distrusted": the fallback acts, or a controller that is old.
     #[getter]
     fn state(&self) -> &'static str {
         match self.tuner.state() {

@@ -29,8 +29,8 @@ impl Around<Dyn, Dyn> for Engine {
 
 /// An ARX model with several outputs, estimated while the plant runs.
 ///
-/// Each output depends on the past of all. The equations share their regressors, P and the work on it; so a sample of which one output
-/// is missing corrects nothing. `Tracker` takes several outputs too, with a memory for each.
+/// Each output depends on the past of all. The equations share their regressors, P and the work on it; so a sample of
+/// which one output is missing corrects nothing. `Tracker` takes several outputs too, with a memory for each.
 ///
 /// Parameters
 /// ----------
@@ -53,19 +53,19 @@ impl Around<Dyn, Dyn> for Engine {
 /// blend : int, optional
 ///     With "mixed", and only there: in how many samples the prior is taken out.
 /// parameters : array_like, shape (n, outputs), optional
-///     What to start from: a column for each output, with the na coefficients of the first output, of the next, then b_0 ... of the first
-///     input, and of the next, then the constant.
+///     What to start from: a column for each output, with the na coefficients of the first output, of the next, then
+///     b_0 ... of the first input, and of the next, then the constant.
 /// covariance : array_like, shape (n, n), optional
 ///     P to start from, in units of the noise variances.
 /// huber : float, default inf
-///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the action is "bounded".
-///     3 loses next to nothing where there are no outliers.
+///     From 1 on: an innovation of more than so many standard deviations corrects as much as one of so many, and the
+///     action is "bounded". 3 loses next to nothing where there are no outliers.
 /// gate : float, default inf
-///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated". 25 is five standard
-///     deviations. Huber's bound or a gate, not both.
+///     From 1 on: a sample whose normalised innovation squared is above it corrects nothing, and the action is "gated".
+///     25 is five standard deviations. Huber's bound or a gate, not both.
 /// release : int, default 0
-///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it again. 0 is never,
-///     but for what the noise variance learns of them.
+///     After so many samples in a row above the gate, those that follow are used ("released"), until one is within it
+///     again. 0 is never, but for what the noise variance learns of them.
 ///
 /// Notes
 /// -----
@@ -204,8 +204,8 @@ impl RecursiveVectorArx {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a shape is wrong, a number infinite or too large, or an input acts on the outputs of its own sample (nk = 0): `log_row` takes
-    ///     that. Nothing has changed then, time included.
+    ///     If a shape is wrong, a number infinite or too large, or an input acts on the outputs of its own sample (nk =
+    ///     0): `log_row` takes that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         self.measure(y)?;
         let innovation = self.engine.stepper.measured(&self.outputs).map_err(|error| failed(py, error))?;
@@ -354,7 +354,8 @@ impl RecursiveVectorArx {
         argument::shaped(py, entries, [lags, l, l])
     }
 
-    /// B(q) of each input, shape (nk + nb, outputs), so that the i-th row multiplies q^-i: nk rows of zeros, then b_0 ... b_(nb-1).
+    /// B(q) of each input, shape (nk + nb, outputs), so that the i-th row multiplies q^-i: nk rows of zeros, then b_0
+    /// ... b_(nb-1).
     #[getter]
     fn b<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let l = self.outputs.len();
@@ -390,7 +391,8 @@ impl RecursiveVectorArx {
         recursive::covariance(py, self.estimator())
     }
 
-    /// The covariance of the parameters of each output, shape (outputs, n, n); None until the noise variances are known.
+    /// The covariance of the parameters of each output, shape (outputs, n, n); None until the noise variances are
+    /// known.
     #[getter]
     fn parameter_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         recursive::parameter_covariance(py, self.estimator())

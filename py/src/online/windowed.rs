@@ -17,7 +17,8 @@ const LARGEST_WINDOW: usize = 100_000_000;
 
 /// Least squares on the last samples, all with the same weight, and on none before them.
 ///
-/// What has left the window has left without trace: nothing is ever subtracted, so that rounding does not stay either. There is no prior.
+/// What has left the window has left without trace: nothing is ever subtracted, so that rounding does not stay either.
+/// There is no prior.
 ///
 /// Parameters
 /// ----------
@@ -26,8 +27,9 @@ const LARGEST_WINDOW: usize = 100_000_000;
 /// blocks : int
 ///     How many blocks the window has, 2 or more.
 /// block : int, default 1
-///     How many samples a block has. The window slides by whole blocks: with 1 it holds exactly the last `blocks` samples, with
-///     more between (blocks - 1) * block + 1 and blocks * block. Memory grows with the number of blocks only.
+///     How many samples a block has. The window slides by whole blocks: with 1 it holds exactly the last `blocks`
+///     samples, with more between (blocks - 1) * block + 1 and blocks * block. Memory grows with the number of blocks
+///     only.
 ///
 /// Raises
 /// ------
@@ -40,13 +42,11 @@ const LARGEST_WINDOW: usize = 100_000_000;
 ///
 ///     theta(k) = arg min sum over the window of (y(i) - phi(i)' theta)^2
 ///
-/// Where the regressors of the window do not determine the parameters, as in a silence of its length, the last estimate that
-/// was one is kept, and the action is "collecting".
+/// Where the regressors of the window do not determine the parameters, as in a silence of its length, the last estimate
+/// that was one is kept, and the action is "collecting".
 ///
-/// References
-/// ----------
-/// Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3. Tangwongsan, Hirzel, Schneider and Wu, General
-/// incremental sliding-window aggregation, 2015.
+/// References ---------- Björck, Numerical Methods for Least Squares Problems, 1996, chapter 3. Tangwongsan, Hirzel,
+/// Schneider and Wu, General incremental sliding-window aggregation, 2015.
 ///
 /// Examples
 /// --------
@@ -177,7 +177,8 @@ impl WindowedLeastSquares {
         self.windowed.clear();
     }
 
-    /// The parameters, shape (n,): those of the window, or of the last one that determined them; 0 before there was one.
+    /// The parameters, shape (n,): those of the window, or of the last one that determined them; 0 before there was
+    /// one.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         argument::from_vector(py, self.windowed.parameters())
@@ -197,8 +198,8 @@ impl WindowedLeastSquares {
         self.windowed.standard_errors().map(|errors| argument::from_vector(py, &errors))
     }
 
-    /// The variance of the residuals of the window; None while it has no more samples than parameters, or does not determine
-    /// them.
+    /// The variance of the residuals of the window; None while it has no more samples than parameters, or does not
+    /// determine them.
     #[getter]
     fn noise_variance(&self) -> Option<f64> {
         self.windowed.noise_variance()

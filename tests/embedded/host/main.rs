@@ -1,9 +1,10 @@
 //! Checks the firmware: the bits it printed, what the bare image holds, what each step cost, how large images are.
 //!
-//! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the output
-//! of the reporting one. It prints the table of costs, with `--images` also that of the sizes of images with one estimator, and
-//! compares them with `budgets.md` and with `docs/firmware.md`. `--write` renews the tables of that page instead. `--bits` compares the bits alone: for this program
-//! in its other build. `--c` is for what is written in C: the bits that it printed, and the costs of exported models.
+//! `check FOLDER` reads, in Cargo's target folder, the images for each processor and level of optimisation and the
+//! output of the reporting one. It prints the table of costs, with `--images` also that of the sizes of images with one
+//! estimator, and compares them with `budgets.md` and with `docs/firmware.md`. `--write` renews the tables of that page
+//! instead. `--bits` compares the bits alone: for this program in its other build. `--c` is for what is written in C:
+//! the bits that it printed, and the costs of exported models.
 
 #[path = "../../../crates/thetahat-c/tests/interface/steps.rs"]
 mod c_steps;

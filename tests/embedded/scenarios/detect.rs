@@ -5,8 +5,8 @@ use thetahat_core::{Action, Alarm, ChangeDetector, Chart, Error, Innovation};
 use crate::record::sample;
 use crate::{Case, Scenario};
 
-/// What the innovations of the true plant are, with the variance of the noise of the record: where the plant is another,
-/// where there is none, and where a sample is missing or out of scale, the charts rise, give alarms, or wait.
+/// What the innovations of the true plant are, with the variance of the noise of the record: where the plant is
+/// another, where there is none, and where a sample is missing or out of scale, the charts rise, give alarms, or wait.
 pub(crate) struct Detector(ChangeDetector<f32>);
 
 impl Scenario for Detector {

@@ -123,8 +123,8 @@ impl StoredMap for Radial<'static, f32> {
     }
 }
 
-/// Four units and a linear path, as a fit on the command line found them: `thetahat fit tests/data/public/robot_arm.csv --sample-time 1
-/// --narx tanh --units 4 --ridge 0.1 --ny 2 --nu 1 --focus prediction`.
+/// Four units and a linear path, as a fit on the command line found them: `thetahat fit tests/data/public/robot_arm.csv
+/// --sample-time 1 --narx tanh --units 4 --ridge 0.1 --ny 2 --nu 1 --focus prediction`.
 impl StoredMap for Network<'static, f32> {
     const NAME: &'static str = "NonlinearArx, 4 units";
     const THETA: &'static [f32] =

@@ -14,8 +14,8 @@ fn root() -> PathBuf {
     Path::new(FOLDER).join("../..")
 }
 
-/// What a program prints, made of these files of C. `None` if there is no compiler: then the test is skipped, by name, but
-/// where CI=true.
+/// What a program prints, made of these files of C. `None` if there is no compiler: then the test is skipped, by name,
+/// but where CI=true.
 pub(crate) fn run(precision: Precision, name: &str, sources: &[&str]) -> Option<String> {
     if !is_there("gcc") {
         return None;

@@ -22,10 +22,11 @@ use crate::{Error, Real};
 pub enum Membership {
     /// 1 in its box, 0 outside.
     Rectangle,
-    /// The product, over the regressors, of a trapezoid: 1 in the middle half of the side of its box, and from there a line down to 0, a
-    /// quarter of the side outside of it; over the sum of all.
+    /// The product, over the regressors, of a trapezoid: 1 in the middle half of the side of its box, and from there a
+    /// line down to 0, a quarter of the side outside of it; over the sum of all.
     Trapezoid,
-    /// The product of Gaussians about the middle of its box, with a third of each side for their standard deviations; over the sum of all.
+    /// The product of Gaussians about the middle of its box, with a third of each side for their standard deviations;
+    /// over the sum of all.
     Gaussian,
 }
 
@@ -35,9 +36,9 @@ pub enum Membership {
 /// g(z) = Σ_i w_i(z) (θ_i0 + θ_i1 z_1 + …),     w_i = m_i(z) / Σ_l m_l(z)
 /// ```
 ///
-/// Boxes divide the domain, as those of the tree of LOLIMOT do (Nelles and Isermann 1996; Nelles, Nonlinear System Identification, 2001,
-/// section 13.3). Outside of the domain weights are those of its nearest point: so the outer planes reach without end, and none that is
-/// wide wins far away (section 13.2.3 there).
+/// Boxes divide the domain, as those of the tree of LOLIMOT do (Nelles and Isermann 1996; Nelles, Nonlinear System
+/// Identification, 2001, section 13.3). Outside of the domain weights are those of its nearest point: so the outer
+/// planes reach without end, and none that is wide wins far away (section 13.2.3 there).
 ///
 /// Cost: twice the memberships of all boxes, with an exponential for each of a Gaussian.
 ///
@@ -174,7 +175,8 @@ impl<T: Real> Basis<T> for Local<'_, T> {
             if weight == T::zero() {
                 continue;
             }
-            // dw_i/dz = w_i (s_i - Σ_l w_l s_l) for the slopes s of the logarithms: Σ_i L_i dw_i = Σ_i w_i s_i (L_i - g).
+            // dw_i/dz = w_i (s_i - Σ_l w_l s_l) for the slopes s of the logarithms: Σ_i L_i dw_i = Σ_i w_i s_i (L_i -
+            // g).
             let above = self.plane(parameters, z) - value;
             for (regressor, (slope, &z)) in slopes.iter_mut().zip(z).enumerate() {
                 let own_slope = parameters.get(regressor + 1).copied().unwrap_or_else(T::zero);

@@ -15,12 +15,14 @@ pub const MOST_SLOPES: usize = 32;
 /// g(z) = Σ_i w_i(z) θ_i,     w_i = 1/k + (z - z̄)'(S + ρ I)^-1 (z_i - z̄)  of the k nearest, 0 of all others
 /// ```
 ///
-/// The parameters θ are the outputs of the samples. z̄ is the mean of the nearest, S the sum of (z_i - z̄)(z_i - z̄)', and ρ a hundredth of
-/// the mean of its diagonal: so that a plane is decided where neighbours lie on a line. Without `planes` the second part is left out
-/// (Stone 1977; Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009, sections 13.3 and 6.1.1).
+/// The parameters θ are the outputs of the samples. z̄ is the mean of the nearest, S the sum of (z_i - z̄)(z_i - z̄)',
+/// and ρ a hundredth of the mean of its diagonal: so that a plane is decided where neighbours lie on a line. Without
+/// `planes` the second part is left out (Stone 1977; Hastie, Tibshirani and Friedman, The Elements of Statistical
+/// Learning, 2nd ed. 2009, sections 13.3 and 6.1.1).
 ///
-/// Cost: a distance to each of the samples, and with n regressors k n²/2 + n³/6 multiplications of a plane. On the stack are
-/// [`MOST_NEIGHBOURS`] places and distances, and [`MOST_SLOPES`] (`MOST_SLOPES` + 5)/2 numbers: some 4 kB in `f32`.
+/// Cost: a distance to each of the samples, and with n regressors k n²/2 + n³/6 multiplications of a plane. On the
+/// stack are [`MOST_NEIGHBOURS`] places and distances, and [`MOST_SLOPES`] (`MOST_SLOPES` + 5)/2 numbers: some 4 kB in
+/// `f32`.
 ///
 /// ```
 /// use thetahat_core::{Basis, Neighbours};
@@ -40,7 +42,8 @@ pub struct Neighbours<'a, T> {
     pub planes: bool,
 }
 
-/// The places of the nearest, in rising order, and what is known of a plane through them. It is large: it is filled where it stands.
+/// The places of the nearest, in rising order, and what is known of a plane through them. It is large: it is filled
+/// where it stands.
 struct Around<T> {
     places: [usize; MOST_NEIGHBOURS],
     count: usize,
@@ -72,7 +75,8 @@ fn start(row: usize) -> usize {
     row * (row + 1) / 2
 }
 
-/// A row of a lower triangle, with the diagonal last. Every access is total: with indexing, panics stay in the firmware.
+/// A row of a lower triangle, with the diagonal last. Every access is total: with indexing, panics stay in the
+/// firmware.
 fn row<T>(triangle: &[T], index: usize) -> &[T] {
     triangle.get(start(index)..start(index + 1)).unwrap_or_default()
 }

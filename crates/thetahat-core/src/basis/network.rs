@@ -55,8 +55,8 @@ impl Activation {
 /// f_j(z) = f(w_j' z + b_j)
 /// ```
 ///
-/// (Rumelhart, Hinton and Williams 1986; Ljung, System Identification, 2nd ed., section 5.4). The weights w and b of the hidden layer are
-/// a view of numbers that may stand in flash; the model is linear in those of the output.
+/// (Rumelhart, Hinton and Williams 1986; Ljung, System Identification, 2nd ed., section 5.4). The weights w and b of
+/// the hidden layer are a view of numbers that may stand in flash; the model is linear in those of the output.
 ///
 /// The hyperbolic tangent is that of the crate libm, so that every machine gives the same bits.
 ///

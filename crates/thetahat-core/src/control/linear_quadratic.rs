@@ -14,15 +14,15 @@ use crate::{Covariance, Dimension, Error, GainSchedule, LinearObservation, Linea
 /// ```
 ///
 /// It is the dual of the Kalman filter: K' is the predictor gain of F' and G', and is found as that is
-/// ([`GainSchedule::steady_state`]), on factors, so that P stays positive. The weights are given as what holds such a matrix,
-/// [`Covariance`]. A weight w of an output H x is w H'H.
+/// ([`GainSchedule::steady_state`]), on factors, so that P stays positive. The weights are given as what holds such a
+/// matrix, [`Covariance`]. A weight w of an output H x is w H'H.
 ///
 /// N is the number of states, n, and M that of inputs, m. K_ij has the unit of input i over that of state j.
 ///
 /// For one input the loop keeps a distance from instability: |1 + K (z - F)⁻¹ G|² is nowhere less than R/(R + G'P G).
 ///
-/// Source: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, sections 2.4 and 5.4; Åström and Wittenmark,
-/// Computer-Controlled Systems, 3rd ed. 1997, section 11.2.
+/// Source: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, sections 2.4 and 5.4; Åström and
+/// Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 11.2.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, Matrix1, Vector1};
@@ -55,10 +55,11 @@ impl<
 {
     /// The feedback of F, n x n, G, n x m, Q and R.
     ///
-    /// Errors: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`); [`Error::NotConverged`] after `maximum_steps`, as where
-    /// what is unstable cannot be reached by the inputs, or something on the unit circle has no weight;
-    /// [`Error::NoVariance`] if an input has no weight and acts on nothing; [`Error::Overflow`]. A step costs about 2 n³ + n² m
-    /// multiply-adds, and there are as many as the loop needs to settle, and half as many again.
+    /// Errors: [`Error::NotFinite`]; [`Error::Length`] (only with `Dyn`); [`Error::NotConverged`] after
+    /// `maximum_steps`, as where what is unstable cannot be reached by the inputs, or something on the unit circle has
+    /// no weight; [`Error::NoVariance`] if an input has no weight and acts on nothing; [`Error::Overflow`]. A step
+    /// costs about 2 n³ + n² m multiply-adds, and there are as many as the loop needs to settle, and half as many
+    /// again.
     ///
     /// ```
     /// use thetahat_core::nalgebra::{Const, Matrix2, Vector1, Vector2};

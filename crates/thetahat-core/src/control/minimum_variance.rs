@@ -59,8 +59,8 @@ pub struct MinimumVariance<T> {
     /// ρ, what u² costs beside (y - u_c)²; with an integrator what the square of a change of u costs. 0 is the minimum
     /// variance of the output, at whatever price, and needs a plant whose inverse is stable.
     pub input_weight: T,
-    /// Whether the noise drifts, C/(1 - q⁻¹) e in place of C e: then the controller integrates, and a constant load leaves
-    /// no error.
+    /// Whether the noise drifts, C/(1 - q⁻¹) e in place of C e: then the controller integrates, and a constant load
+    /// leaves no error.
     pub integrator: bool,
 }
 
@@ -90,20 +90,22 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// (B' F + ρ/b_0 C) u(k) = C u_c(k) - G y(k)
     /// ```
     ///
-    /// With ρ = 0 the output is y(k) = u_c(k-d) + F e(k), whose variance σ² Σ f_i² no linear controller can make smaller. The poles of the
-    /// loop are those of C and of b_0 B' + ρ A. With an integrator A is A (1 - q⁻¹) in all of this, and u is its change.
-    /// `a`, `b` and `c` are polynomials from the power 0 on, b with its leading zeros. For ARX models c is `[1]`.
+    /// With ρ = 0 the output is y(k) = u_c(k-d) + F e(k), whose variance σ² Σ f_i² no linear controller can make
+    /// smaller. The poles of the loop are those of C and of b_0 B' + ρ A. With an integrator A is A (1 - q⁻¹) in all of
+    /// this, and u is its change. `a`, `b` and `c` are polynomials from the power 0 on, b with its leading zeros. For
+    /// ARX models c is `[1]`.
     ///
     /// A set point has the gain B'(1)/(B'(1) + ρ/b_0 A(1)), which is 1 with an integrator.
     ///
-    /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a or c does not begin with 1, b not with 0 or is all zeros,
-    /// c or the loop has a zero that is not inside the radius 1 - 1/1024 (B' for ρ = 0: try a weight; A for a large ρ); [`Error::Orders`] if `N` is less than [`MinimumVarianceOrders::size`]; [`Error::Overflow`] for numbers at the ends
-    /// of `T`.
+    /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a or c does not begin with 1, b not with 0 or is all
+    /// zeros, c or the loop has a zero that is not inside the radius 1 - 1/1024 (B' for ρ = 0: try a weight; A for a
+    /// large ρ); [`Error::Orders`] if `N` is less than [`MinimumVarianceOrders::size`]; [`Error::Overflow`] for numbers
+    /// at the ends of `T`.
     ///
     /// About 3 N² multiply-adds.
     ///
-    /// Source: Åström, Introduction to Stochastic Control Theory, 1970, chapter 6; Clarke and Gawthrop, Self-tuning controller,
-    /// Proc. IEE 122 (9), 1975 (ρ).
+    /// Source: Åström, Introduction to Stochastic Control Theory, 1970, chapter 6; Clarke and Gawthrop, Self-tuning
+    /// controller, Proc. IEE 122 (9), 1975 (ρ).
     ///
     /// ```
     /// use thetahat_core::nalgebra::Const;
@@ -180,7 +182,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
             let power = delay + place;
             *entry = (at(c, power) - f_times(r.as_slice(), delay, &denominator, power)) / leading;
         }
-        // B' F + ρ/b_0 C from its highest power down: what is overwritten is not needed any more, but F is. So into a copy.
+        // B' F + ρ/b_0 C from its highest power down: what is overwritten is not needed any more, but F is. So into a
+        // copy.
         let f = r.clone();
         let times_f = |power: usize| {
             let f = f.as_slice().iter().take(delay - 1);

@@ -19,8 +19,8 @@ use crate::{Error, Real};
 /// T = K (β + h/T_i - β q⁻¹) (1 - γ q⁻¹)
 /// ```
 ///
-/// Without an integral R, S and T lack the factor 1 - q⁻¹. Beyond its limits the controller tracks the input that acted, with
-/// the poles of T: within the time T_i β and that of the filter.
+/// Without an integral R, S and T lack the factor 1 - q⁻¹. Beyond its limits the controller tracks the input that
+/// acted, with the poles of T: within the time T_i β and that of the filter.
 ///
 /// Source: Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 8.5.
 ///

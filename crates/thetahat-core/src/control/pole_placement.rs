@@ -81,16 +81,17 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     /// A R + B S = A_m A_o,   T = A_o A_m(1)/B(1),   then y = (B T)/(A_m A_o) u_c = B A_m(1)/(B(1) A_m) u_c
     /// ```
     ///
-    /// With zeros cancelled B = B⁺ B⁻ with B⁻ = b q⁻ᵈ, R = R' B⁺ and A R' + B⁻ S = A_m A_o, T = A_o A_m(1)/b; with an integrator
-    /// R has the factor 1 - q⁻¹. The equation is linear in the coefficients, and solved by a QR factorisation
-    /// ([`LeastSquares`]). `a` and `b` are as [`RecursiveArx::a`](crate::RecursiveArx::a) and
+    /// With zeros cancelled B = B⁺ B⁻ with B⁻ = b q⁻ᵈ, R = R' B⁺ and A R' + B⁻ S = A_m A_o, T = A_o A_m(1)/b; with an
+    /// integrator R has the factor 1 - q⁻¹. The equation is linear in the coefficients, and solved by a QR
+    /// factorisation ([`LeastSquares`]). `a` and `b` are as [`RecursiveArx::a`](crate::RecursiveArx::a) and
     /// [`b`](crate::RecursiveArx::b) give them: from the power 0 on, b with its leading zeros.
     ///
-    /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a, the response or the observer does not begin with 1, b not with 0 (an
-    /// input that acts at once makes a loop without time), b is all zeros or B(1) is 0, a zero that shall be cancelled is not
-    /// inside the radius 1 - 1/1024, or A and B have a common factor, nearly, so that poles cannot be placed; [`Error::Orders`] if `N` is
-    /// not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has more than `N` coefficients after its 1;
-    /// [`Error::TooLarge`] and [`Error::Overflow`] for numbers at the ends of `T`.
+    /// Errors: [`Error::NotFinite`]; [`Error::OutOfRange`] if a, the response or the observer does not begin with 1, b
+    /// not with 0 (an input that acts at once makes a loop without time), b is all zeros or B(1) is 0, a zero that
+    /// shall be cancelled is not inside the radius 1 - 1/1024, or A and B have a common factor, nearly, so that poles
+    /// cannot be placed; [`Error::Orders`] if `N` is not [`PlacementOrders::size`]; [`Error::Length`] if A_m A_o has
+    /// more than `N` coefficients after its 1; [`Error::TooLarge`] and [`Error::Overflow`] for numbers at the ends of
+    /// `T`.
     ///
     /// About 10 N³ flops.
     ///
@@ -113,8 +114,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         Self::pole_placement_with(a, b, wanted, exactly)
     }
 
-    /// The same with the `N` that is made of [`PlacementOrders::size`]. A larger one has more coefficients of R, for an A_m A_o of
-    /// a higher degree.
+    /// The same with the `N` that is made of [`PlacementOrders::size`]. A larger one has more coefficients of R, for an
+    /// A_m A_o of a higher degree.
     pub(super) fn pole_placement_with(
         a: &[T],
         b: &[T],
@@ -237,9 +238,9 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     }
 
     /// How far the loop with a model A(q) y = B(q) u is from instability: the largest |1/(1 + L)| and |L/(1 + L)| with
-    /// L = B S/(A R), over this many frequencies from 0 to that of half the sampling, closer to one another towards 0. 2 is a usual
-    /// limit of both; a loop whose
-    /// poles were placed inside the unit circle is stable, but near to instability where they are above 3 or so.
+    /// L = B S/(A R), over this many frequencies from 0 to that of half the sampling, closer to one another towards 0.
+    /// 2 is a usual limit of both; a loop whose poles were placed inside the unit circle is stable, but near to
+    /// instability where they are above 3 or so.
     ///
     /// About 10 N multiply-adds for each frequency.
     pub fn peaks(&self, a: &[T], b: &[T], frequencies: usize) -> (T, T) {
@@ -256,8 +257,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
     }
 }
 
-/// e^(-iω) of the frequencies ω = π ((k + 1/2)/n)² in their order, each from the one before: sines are dear where there is no unit
-/// for double precision.
+/// e^(-iω) of the frequencies ω = π ((k + 1/2)/n)² in their order, each from the one before: sines are dear where there
+/// is no unit for double precision.
 ///
 /// ```text
 /// ω(k+1) - ω(k) = 2π (k+1)/n²

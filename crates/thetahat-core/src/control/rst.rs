@@ -14,8 +14,8 @@ use crate::{Dimension, Error, Real};
 /// R = 1 + r_1 q⁻¹ + …,   S = s_0 + s_1 q⁻¹ + …,   T = t_0 A_o,   A_o = 1 + a_1 q⁻¹ + …: the observer polynomial
 /// ```
 ///
-/// What it asks for beyond its limits, the actuator does not do. So that it does not go on integrating then, it observes
-/// itself with the input that acted, u = v within the limits, through A_o:
+/// What it asks for beyond its limits, the actuator does not do. So that it does not go on integrating then, it
+/// observes itself with the input that acted, u = v within the limits, through A_o:
 ///
 /// ```text
 /// A_o v(k) = T u_c(k) - S y(k) + (A_o - R) u(k)
@@ -24,17 +24,18 @@ use crate::{Dimension, Error, Real};
 /// which is the equation above while v is within the limits, and stable beyond them as A_o is (Åström and Wittenmark,
 /// Computer-Controlled Systems, 3rd ed. 1997, section 9.4; Adaptive Control, 2nd ed. 1995, section 11.2).
 ///
-/// y, u and u_c are deviations from a working point at which they belong together: with an integrator in R any, else that of the
-/// model.
+/// y, u and u_c are deviations from a working point at which they belong together: with an integrator in R any, else
+/// that of the model.
 ///
 /// # Time
 ///
-/// [`control`](RstController::control) is called once a sample, and gives the input that acts from now on. Where the actuator
-/// reports that it did something else, [`applied`](RstController::applied) says so before the next sample. A measurement that
-/// is NaN is missing: the input stays as it was, and the controller goes on as if nothing had been measured.
+/// [`control`](RstController::control) is called once a sample, and gives the input that acts from now on. Where the
+/// actuator reports that it did something else, [`applied`](RstController::applied) says so before the next sample. A
+/// measurement that is NaN is missing: the input stays as it was, and the controller goes on as if nothing had been
+/// measured.
 ///
-/// `N` is the number of coefficients of S, and of R and A_o without their leading 1: shorter ones are filled up with zeros.
-/// Memory: 4 N + 4 numbers. A step: 4 N multiply-adds.
+/// `N` is the number of coefficients of S, and of R and A_o without their leading 1: shorter ones are filled up with
+/// zeros. Memory: 4 N + 4 numbers. A step: 4 N multiply-adds.
 ///
 /// ```
 /// use thetahat_core::nalgebra::Const;
@@ -111,8 +112,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         Ok(())
     }
 
-    /// Takes over from a hand: if the measurement and the set point stay as they are, the input stays at this one first, and then
-    /// goes where the controller wants it.
+    /// Takes over from a hand: if the measurement and the set point stay as they are, the input stays at this one
+    /// first, and then goes where the controller wants it.
     pub fn start(&mut self, input: T, measurement: T, set_point: T) {
         self.input = input;
         // As if all had been so for ever.
@@ -123,8 +124,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         }
     }
 
-    /// The input from now on, within the limits. With a measurement that is not finite, or a set point that is not, it stays as it
-    /// was, and the state too.
+    /// The input from now on, within the limits. With a measurement that is not finite, or a set point that is not, it
+    /// stays as it was, and the state too.
     pub fn control(&mut self, set_point: T, measurement: T) -> T {
         let wanted = self.gain * set_point - at_first(&self.s) * measurement + at_first(&self.state);
         if !wanted.is_finite() {
@@ -140,8 +141,8 @@ impl<T: Real, N: Dimension> RstController<T, N> {
         input
     }
 
-    /// Tells that the actuator did something else than the latest [`control`](RstController::control) asked for. A number that is
-    /// not finite is not taken.
+    /// Tells that the actuator did something else than the latest [`control`](RstController::control) asked for. A
+    /// number that is not finite is not taken.
     pub fn applied(&mut self, input: T) {
         let change = input - self.input;
         if !change.is_finite() {

@@ -172,7 +172,8 @@ fn the_loop_answers_as_was_wanted_and_a_load_is_forgotten() -> Result<(), Error>
     Ok(())
 }
 
-/// An actuator at its limit does not wind the integrator up, whether the controller knows the limit or is told what acted.
+/// An actuator at its limit does not wind the integrator up, whether the controller knows the limit or is told what
+/// acted.
 #[test]
 fn limits_do_not_wind_it_up() -> Result<(), Error> {
     let (a, b) = motor();

@@ -45,8 +45,8 @@ impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N,
 }
 
 impl<T: Real, N: Dimension, D: Dimension> Lags<T, N, D> {
-    /// That they are of this many outputs, and make this many parameters, of which the last `residuals` are those of past
-    /// residuals.
+    /// That they are of this many outputs, and make this many parameters, of which the last `residuals` are those of
+    /// past residuals.
     pub(crate) fn check_counts(
         &self,
         parameters: usize,

@@ -55,7 +55,8 @@ impl<T: Real, N: Dimension> LeastSquares<T, N> {
         self.rows = self.rows.saturating_add(rows);
     }
 
-    /// Whether what is left of each column, once those before it are projected out, is more than this share of its norm.
+    /// Whether what is left of each column, once those before it are projected out, is more than this share of its
+    /// norm.
     pub(crate) fn is_determined(&self, share: T) -> bool {
         let size = self.size().value();
         self.rows >= size && least_remainder(self.factor_rows.as_slice(), size) > share

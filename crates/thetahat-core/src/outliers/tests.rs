@@ -27,8 +27,8 @@ impl Noise {
     }
 }
 
-/// Runs a plant of second order; `noise_of` and `spike_of` give the noise of the equation and of the sensor of a sample;
-/// `sample` takes y(k) and u(k).
+/// Runs a plant of second order; `noise_of` and `spike_of` give the noise of the equation and of the sensor of a
+/// sample; `sample` takes y(k) and u(k).
 fn run(samples: usize, spike_of: impl Fn(usize) -> f64, mut sample: impl FnMut(usize, f64, f64)) {
     let (mut noise, mut y, mut u) = (Noise(1), [0.0; 2], [0.0; 2]);
     for k in 0..samples {
@@ -223,9 +223,9 @@ fn thresholds_below_one_are_refused_and_change_nothing() {
     }
 }
 
-/// Of 100 runs of ARX(1, 1) with Gaussian noise and forgetting by 0.99: the error of b_0 in its deviations without a rule, by its mean
-/// square; without outliers, with one sample in 100 a spike of 30 deviations, and after b_0 changes from 1 to 2, how many samples
-/// it takes until half of that is learnt.
+/// Of 100 runs of ARX(1, 1) with Gaussian noise and forgetting by 0.99: the error of b_0 in its deviations without a
+/// rule, by its mean square; without outliers, with one sample in 100 a spike of 30 deviations, and after b_0 changes
+/// from 1 to 2, how many samples it takes until half of that is learnt.
 fn figures(outliers: Outliers<f64>) -> [f64; 3] {
     let orders = ArxOrders { na: 1, inputs: &[InputOrders { nb: 1, nk: 1 }], constant: false };
     let mut sums = [0.0; 3];

@@ -32,7 +32,8 @@ fn normal(noise: &mut Noise) -> f64 {
     (0..12).map(|_| noise.next()).sum::<f64>() / 2.0
 }
 
-/// y and u of the plant of the table: x(k) = 0.9 x(k-1) + 0.08 u(k-1), sensor noise of half the deviation, with this pole.
+/// y and u of the plant of the table: x(k) = 0.9 x(k-1) + 0.08 u(k-1), sensor noise of half the deviation, with this
+/// pole.
 fn record(samples: usize, pole: f64, noise: &mut Noise) -> Vec<(f64, f64)> {
     let deviation = 0.5 * 0.08 / (1.0_f64 - 0.81).sqrt();
     let (mut x, mut v) = (0.0, normal(noise));

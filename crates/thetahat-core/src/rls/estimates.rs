@@ -48,7 +48,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         &self.parameters
     }
 
-    /// The part of the innovation of an outlier that was not used; `None` of other samples, and of outliers right after others.
+    /// The part of the innovation of an outlier that was not used; `None` of other samples, and of outliers right after
+    /// others.
     #[inline(always)]
     pub(crate) fn unused(&self, nis: T, action: Action) -> Option<T> {
         self.outliers.unused(nis, action)

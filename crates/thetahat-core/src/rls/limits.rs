@@ -28,11 +28,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     /// Errors, after which nothing has changed: [`Error::Length`] if there is not one range for each parameter;
     /// [`Error::OutOfRange`] if one is empty, or an end is NaN.
     ///
-    /// 2 n comparisons where all hold. With a limits active some 1.5 n² a² multiply-adds, 3 n² for one, and n² + 4 n numbers
-    /// on the stack. (With `Dyn` the first call that moves takes memory for them.)
+    /// 2 n comparisons where all hold. With a limits active some 1.5 n² a² multiply-adds, 3 n² for one, and n² + 4 n
+    /// numbers on the stack. (With `Dyn` the first call that moves takes memory for them.)
     ///
-    /// Source: Nocedal and Wright, Numerical Optimization, 2nd ed., section 16.5 (active sets); Goodwin and Sin, Adaptive
-    /// Filtering Prediction and Control, 1984, section 3.7 (projection in the metric of P).
+    /// Source: Nocedal and Wright, Numerical Optimization, 2nd ed., section 16.5 (active sets); Goodwin and Sin,
+    /// Adaptive Filtering Prediction and Control, 1984, section 3.7 (projection in the metric of P).
     ///
     /// ```
     /// use core::ops::RangeInclusive;
@@ -66,8 +66,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
         !all
     }
 
-    /// By a set of active limits: the limit that is passed by most, in standard deviations, joins it; one that keeps its
-    /// parameter from going inwards leaves. Once neither happens, that is the point.
+    /// By a set of active limits: the limit that is passed by most, in standard deviations, joins it; one that keeps
+    /// its parameter from going inwards leaves. Once neither happens, that is the point.
     #[cold]
     #[inline(never)]
     fn move_within(&mut self, limits: &[RangeInclusive<T>]) {
@@ -127,7 +127,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
     }
 }
 
-/// The parameter that is furthest out of its limits, in its standard deviations, of those that are at no end yet; the end.
+/// The parameter that is furthest out of its limits, in its standard deviations, of those that are at no end yet; the
+/// end.
 fn furthest_out<T: Real>(
     parameters: &[T],
     limits: &[RangeInclusive<T>],

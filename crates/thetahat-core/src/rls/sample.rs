@@ -102,8 +102,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
                 (gain, share, action) = match outlier {
                     None => {
                         outliers.in_a_row = 0;
-                        // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes the prior
-                        // out does so from the residuals too: then every sample counts.
+                        // A sample that fixes parameters tells of the prior as well as of the noise. A start that takes
+                        // the prior out does so from the residuals too: then every sample counts.
                         let fixing = with_prior && ratio > T::from_count(11);
                         (inverse, if fixing { T::zero() } else { noise * inverse }, Action::Updated)
                     }
@@ -152,8 +152,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         self.held_columns > 0
     }
 
-    /// Where P_ii > p_i, holds the columns of U that make at least p_i/n of it. If column i is held: keeps its noise, and
-    /// lets it go once it makes at most p_k/(2 n) of any P_kk.
+    /// Where P_ii > p_i, holds the columns of U that make at least p_i/n of it. If column i is held: keeps its noise,
+    /// and lets it go once it makes at most p_k/(2 n) of any P_kk.
     #[cold]
     #[inline(never)]
     fn look(&mut self, row: usize, is_above: bool) {
@@ -229,8 +229,8 @@ fn check_small<T: Real>(gradient: &[T], errors: &[T], spread: T) -> Result<(), E
     Ok(())
 }
 
-/// D_j <- D_j/λ, of the columns that are not held and tell more than `silence`, given f = U'φ and v = D f. Keeps v = D f;
-/// returns φ'P φ.
+/// D_j <- D_j/λ, of the columns that are not held and tell more than `silence`, given f = U'φ and v = D f. Keeps v = D
+/// f; returns φ'P φ.
 #[inline(always)]
 fn forget_columns<T: Real>(
     factor: &mut [T],

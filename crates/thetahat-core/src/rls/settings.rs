@@ -8,7 +8,8 @@ use crate::outliers::Watch;
 use crate::{Covariance, Dimension, Error, Outliers, Real, RecursiveLeastSquares};
 
 impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
-    /// Sets the noise variance: see [`with_noise_variance`](RecursiveLeastSquares::with_noise_variance), whose errors it has.
+    /// Sets the noise variance: see [`with_noise_variance`](RecursiveLeastSquares::with_noise_variance), whose errors
+    /// it has.
     pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
         if !(variance >= T::zero() && variance.is_finite()) {
             return Err(Error::OutOfRange { argument: "variance", range: "finite and at least 0" });
@@ -26,8 +27,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>> RecursiveLeastSquares<T, N> {
 }
 
 impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T, N, M> {
-    /// Sets the parameters: see [`with_parameters`](RecursiveLeastSquares::with_parameters), whose errors it has. P and the
-    /// noise variance stay.
+    /// Sets the parameters: see [`with_parameters`](RecursiveLeastSquares::with_parameters), whose errors it has. P and
+    /// the noise variance stay.
     pub fn set_parameters(&mut self, parameters: OMatrix<T, N, M>) -> Result<(), Error> {
         self.check_parameters(&parameters)?;
         self.parameters = parameters;
@@ -45,8 +46,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         check_parameters(parameters.as_slice(), self.bounds.as_slice())
     }
 
-    /// Sets P: see [`with_covariance`](RecursiveLeastSquares::with_covariance), whose errors it has. Parameters and the noise
-    /// variance stay.
+    /// Sets P: see [`with_covariance`](RecursiveLeastSquares::with_covariance), whose errors it has. Parameters and the
+    /// noise variance stay.
     pub fn set_covariance(&mut self, covariance: Covariance<T, N>) -> Result<(), Error> {
         check_length("covariance", self.bounds.len(), covariance.size().value())?;
         let fits = covariance.variances().iter().all(|&variance| is_prior(variance));
@@ -57,14 +58,15 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Ok(())
     }
 
-    /// Takes P for larger by a factor: what was learnt counts that much less, and the next samples more. For a plant that has
-    /// changed, as after a repair: parameters and the noise variance stay.
+    /// Takes P for larger by a factor: what was learnt counts that much less, and the next samples more. For a plant
+    /// that has changed, as after a repair: parameters and the noise variance stay.
     ///
     /// ```text
     /// P <- factor P,     factor >= 1
     /// ```
     ///
-    /// No variance shrinks here, and one of 0 stays 0. One above the bound does not grow by forgetting. A start that is not over ends.
+    /// No variance shrinks here, and one of 0 stays 0. One above the bound does not grow by forgetting. A start that is
+    /// not over ends.
     ///
     /// Errors, after which nothing has changed: [`Error::OutOfRange`] if the factor is not finite and at least 1;
     /// [`Error::TooLarge`] or [`Error::Overflow`] if a variance exceeds what the largest prior can be (3e20 in `f32`).
@@ -92,17 +94,17 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         self.set_covariance(self.covariance.widened(factor)?)
     }
 
-    /// The same by a sum, P <- P + Q: where some parameters have changed and others have not. Q is in units of the noise
-    /// variance. One whose variance was 0 is free again if that of Q is not.
+    /// The same by a sum, P <- P + Q: where some parameters have changed and others have not. Q is in units of the
+    /// noise variance. One whose variance was 0 is free again if that of Q is not.
     ///
-    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`); [`Error::TooLarge`] or [`Error::Overflow`],
-    /// as for [`widen`](RecursiveLeastSquares::widen). 1.5 n³ multiply-adds.
+    /// Errors, after which nothing has changed: [`Error::Length`] (only with `Dyn`); [`Error::TooLarge`] or
+    /// [`Error::Overflow`], as for [`widen`](RecursiveLeastSquares::widen). 1.5 n³ multiply-adds.
     pub fn widen_by(&mut self, covariance: &Covariance<T, N>) -> Result<(), Error> {
         self.set_covariance(self.covariance.plus(covariance)?)
     }
 
-    /// Sets the rule for outliers: see [`with_outliers`](RecursiveLeastSquares::with_outliers), whose errors it has. They are
-    /// counted anew.
+    /// Sets the rule for outliers: see [`with_outliers`](RecursiveLeastSquares::with_outliers), whose errors it has.
+    /// They are counted anew.
     pub fn set_outliers(&mut self, outliers: Outliers<T>) -> Result<(), Error> {
         self.outliers = Watch::new(outliers)?;
         Ok(())
@@ -134,22 +136,24 @@ pub(super) fn is_prior<T: Real>(variance: T) -> bool {
 pub(super) fn check_parameters<T: Real>(parameters: &[T], bounds: &[T]) -> Result<(), Error> {
     check_finite("parameters", parameters)?;
     let fits = |(&parameter, &bound): (&T, &T)| {
-        // The square of a hundredth of what is predicted: what was absorbed may have made more of it than can be absorbed again.
+        // The square of a hundredth of what is predicted: what was absorbed may have made more of it than can be
+        // absorbed again.
         parameter / bound * parameter / T::from_count(100) <= T::LARGEST_ENTRY
     };
     let fit = parameters.iter().zip(bounds.iter().cycle()).all(fits);
     fit.then_some(()).ok_or(Error::TooLarge { argument: "parameters" })
 }
 
-/// The settings that an estimator with delay lines passes on to its least squares, of this type and with these parameters.
-/// It has a `set_parameters` of its own, where what it asks of parameters is checked; `$allows` says whether it can have
-/// this rule for outliers.
+/// The settings that an estimator with delay lines passes on to its least squares, of this type and with these
+/// parameters. It has a `set_parameters` of its own, where what it asks of parameters is checked; `$allows` says
+/// whether it can have this rule for outliers.
 macro_rules! pass_on_settings {
     ($parameters:ty, $estimator:ty) => {
         pass_on_settings!($parameters, $estimator, |_, _| Ok(()));
     };
     ($parameters:ty, $estimator:ty, $allows:expr) => {
-        /// The same with these parameters to start from: see [`set_parameters`](Self::set_parameters), whose errors it has.
+        /// The same with these parameters to start from: see [`set_parameters`](Self::set_parameters), whose errors it
+        /// has.
         pub fn with_parameters(mut self, parameters: $parameters) -> Result<Self, crate::Error> {
             self.set_parameters(parameters)?;
             Ok(self)
@@ -173,14 +177,14 @@ macro_rules! pass_on_settings {
             self.estimator.set_covariance(covariance)
         }
 
-        /// Takes P for larger by a factor: see [`RecursiveLeastSquares::widen`](crate::RecursiveLeastSquares::widen), whose
-        /// errors it has.
+        /// Takes P for larger by a factor: see [`RecursiveLeastSquares::widen`](crate::RecursiveLeastSquares::widen),
+        /// whose errors it has.
         pub fn widen(&mut self, factor: T) -> Result<(), crate::Error> {
             self.estimator.widen(factor)
         }
 
-        /// Takes P for larger by a sum: see [`RecursiveLeastSquares::widen_by`](crate::RecursiveLeastSquares::widen_by),
-        /// whose errors it has.
+        /// Takes P for larger by a sum: see
+        /// [`RecursiveLeastSquares::widen_by`](crate::RecursiveLeastSquares::widen_by), whose errors it has.
         pub fn widen_by(&mut self, covariance: &crate::Covariance<T, N>) -> Result<(), crate::Error> {
             self.estimator.widen_by(covariance)
         }
@@ -194,14 +198,14 @@ macro_rules! pass_on_settings {
         }
 
         /// Turns adaptation off, or on again: see
-        /// [`RecursiveLeastSquares::set_adaptation`](crate::RecursiveLeastSquares::set_adaptation). Samples are still taken
-        /// in, so that predictions go on.
+        /// [`RecursiveLeastSquares::set_adaptation`](crate::RecursiveLeastSquares::set_adaptation). Samples are still
+        /// taken in, so that predictions go on.
         pub fn set_adaptation(&mut self, on: bool) {
             self.estimator.set_adaptation(on);
         }
 
-        /// The least squares estimator: parameters, covariance, noise variance, excitation. That of a nonlinear ARX model is
-        /// on functions of scaled signals.
+        /// The least squares estimator: parameters, covariance, noise variance, excitation. That of a nonlinear ARX
+        /// model is on functions of scaled signals.
         pub fn estimator(&self) -> &$estimator {
             &self.estimator
         }

@@ -1,5 +1,5 @@
-//! Inputs that are held: directions of the parameters that are not excited for a long time. What the standard errors say of
-//! them is true, whatever is forgotten meanwhile.
+//! Inputs that are held: directions of the parameters that are not excited for a long time. What the standard errors
+//! say of them is true, whatever is forgotten meanwhile.
 //!
 //! `make soak` runs it at full length: 200 runs of 10^6 samples.
 

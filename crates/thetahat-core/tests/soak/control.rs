@@ -71,8 +71,8 @@ fn measured(sample: u64, y: f64, stuck: &mut f64) -> f64 {
     }
 }
 
-/// When the output must be back, for the 40 samples before: after the change of the plant, after the next steps of the set point, after
-/// loads, faults and saturation.
+/// When the output must be back, for the 40 samples before: after the change of the plant, after the next steps of the
+/// set point, after loads, faults and saturation.
 const BACK: [u64; 7] = [300, 1950, 20_300, 33_500, 34_900, 40_800, 50_300];
 
 #[test]
@@ -126,7 +126,8 @@ fn self_tuner() {
         }
     }
     println!("self-tuner: {late} of {judged} late, {changes_late} of them after a change of the plant");
-    // Some are out of the band by a little more than noise: loads on the plant that integrates, with a controller that was chosen slow.
+    // Some are out of the band by a little more than noise: loads on the plant that integrates, with a controller that
+    // was chosen slow.
     assert!(
         50 * late <= judged && 20 * changes_late <= judged / BACK.len(),
         "{late} {changes_late} of {judged}"

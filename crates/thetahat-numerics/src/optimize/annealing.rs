@@ -13,16 +13,16 @@ const LAST: f64 = 1e-4;
 /// Trials at each temperature.
 const TRIALS: usize = 30;
 
-/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met, of which it gives the cost
-/// (Kirkpatrick, Gelatt and Vecchi, Science 220, 1983; Metropolis and others 1953). A step that raises the cost J by dJ is taken with the
-/// probability
+/// Wanders through the parameters from `point` by random steps d, and leaves there the best of all that were met, of
+/// which it gives the cost (Kirkpatrick, Gelatt and Vecchi, Science 220, 1983; Metropolis and others 1953). A step that
+/// raises the cost J by dJ is taken with the probability
 ///
 /// ```text
 /// exp(-dJ/T),   T falling from 0.3 J to 1e-4 J by the same factor from stage to stage
 /// ```
 ///
-/// A step is normal, of root(T/(G_ii p)) in each of p parameters, with G the normal equations at the start: so that it changes J by about
-/// T where J is quadratic. There are as many stages as iterations are allowed, with 30 trials each.
+/// A step is normal, of root(T/(G_ii p)) in each of p parameters, with G the normal equations at the start: so that it
+/// changes J by about T where J is quadratic. There are as many stages as iterations are allowed, with 30 trials each.
 ///
 /// # Errors
 /// [`Error::Interrupted`]; the refusal of a start that has no normal equations.

@@ -9,11 +9,12 @@ const DEPENDENT: f64 = 1e-13;
 /// How many columns are factored at once.
 const BLOCK: usize = 64;
 
-/// `G = L L'` in place for a symmetric matrix of `size` rows, of which the lower triangle is read and replaced by L. Gives
-/// the number of columns that depend on those before them: they are left out, and solutions are zero there. n^3/6 multiply-adds.
+/// `G = L L'` in place for a symmetric matrix of `size` rows, of which the lower triangle is read and replaced by L.
+/// Gives the number of columns that depend on those before them: they are left out, and solutions are zero there. n^3/6
+/// multiply-adds.
 ///
-/// By blocks of columns, each less what those before it explain of it, which is one product of matrices (Golub and Van Loan, 4th ed. 2013,
-/// section 4.2.9): faer's own Cholesky factor stops at the first dependent column.
+/// By blocks of columns, each less what those before it explain of it, which is one product of matrices (Golub and Van
+/// Loan, 4th ed. 2013, section 4.2.9): faer's own Cholesky factor stops at the first dependent column.
 pub fn factor(matrix: &mut [f64], size: usize) -> usize {
     let (mut dependent, mut diagonals) = (0, [0.0; BLOCK]);
     for first in (0..size).step_by(BLOCK) {

@@ -8,12 +8,12 @@ use std::ops::Range;
 /// J(theta + s) = J(theta) - 2 g's + s'G s
 /// ```
 ///
-/// G is positive semidefinite. For a sum of squared errors e with psi = -de/dtheta, g = psi'e and G = psi'psi; for -2 ln L, twice the
-/// negative logarithm of a likelihood, g is the gradient of ln L and G the information.
+/// G is positive semidefinite. For a sum of squared errors e with psi = -de/dtheta, g = psi'e and G = psi'psi; for -2
+/// ln L, twice the negative logarithm of a likelihood, g is the gradient of ln L and G the information.
 ///
-/// An objective may have unknowns of its own beside the parameters, the weights of free responses, which enter the errors
-/// linearly: [`evaluate`](Self::evaluate) takes trial weights, [`linearize`](Self::linearize) makes these, and the parameters
-/// evaluated last, the current point.
+/// An objective may have unknowns of its own beside the parameters, the weights of free responses, which enter the
+/// errors linearly: [`evaluate`](Self::evaluate) takes trial weights, [`linearize`](Self::linearize) makes these, and
+/// the parameters evaluated last, the current point.
 pub trait Objective {
     /// Why parameters have no cost.
     type Refusal;
@@ -27,7 +27,8 @@ pub trait Objective {
     /// J at these parameters and the trial weights.
     fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Self::Refusal>;
 
-    /// Forms the normal equations at the parameters evaluated last. Gives by how much the free responses alone can lower J.
+    /// Forms the normal equations at the parameters evaluated last. Gives by how much the free responses alone can
+    /// lower J.
     fn linearize(&mut self) -> Result<f64, Self::Refusal>;
 
     /// G, row by row, the free responses taken out.
@@ -36,8 +37,8 @@ pub trait Objective {
     /// g: minus half the gradient of J.
     fn right(&self) -> &[f64];
 
-    /// What the tolerance is a fraction of, where J was linearised last: J itself, unless J may be zero or negative at its minimum
-    /// for other reasons than a perfect fit.
+    /// What the tolerance is a fraction of, where J was linearised last: J itself, unless J may be zero or negative at
+    /// its minimum for other reasons than a perfect fit.
     fn scale(&self, cost: f64) -> f64 {
         cost
     }
@@ -57,8 +58,8 @@ pub trait Objective {
         0..0
     }
 
-    /// The normal equations of these alone, at the parameters evaluated last: writes their part of G, row by row, and of
-    /// g. What else [`linearize`](Self::linearize) forms need not be there afterwards.
+    /// The normal equations of these alone, at the parameters evaluated last: writes their part of G, row by row, and
+    /// of g. What else [`linearize`](Self::linearize) forms need not be there afterwards.
     fn linear_equations(&mut self, matrix: &mut [f64], right: &mut [f64]) -> Result<(), Self::Refusal> {
         self.linearize()?;
         let (size, linear) = (self.right().len(), self.linear());
@@ -100,13 +101,14 @@ pub trait Objective {
     /// Sets the trial weights back to those of the current point.
     fn keep_free(&mut self) {}
 
-    /// Whether parameters were refused as they are outside the region where they have a meaning, such as that of stability.
+    /// Whether parameters were refused as they are outside the region where they have a meaning, such as that of
+    /// stability.
     fn is_outside(_refusal: &Self::Refusal) -> bool {
         false
     }
 
-    /// Moves parameters that are outside that region back into it, nearer to its border than those of `from`. Says whether that was
-    /// possible.
+    /// Moves parameters that are outside that region back into it, nearer to its border than those of `from`. Says
+    /// whether that was possible.
     fn draw_in(&mut self, _from: &[f64], _trial: &mut [f64]) -> bool {
         false
     }
@@ -117,7 +119,7 @@ pub trait Objective {
 pub struct StepRules {
     /// A damped step is halved so often before it is damped more.
     pub shortenings: usize,
-    /// Whether a step that lowers J by more than predicted is doubled as long as J falls further. For objectives without free
-    /// responses.
+    /// Whether a step that lowers J by more than predicted is doubled as long as J falls further. For objectives
+    /// without free responses.
     pub lengthens: bool,
 }

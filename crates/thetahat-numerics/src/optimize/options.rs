@@ -25,7 +25,8 @@ pub enum Algorithm {
     Annealing,
 }
 
-/// The length of the steps of [`Algorithm::Gradient`]: `c1/(c2 + l)` in iteration l = 0, 1, …; `c1` if there is no `c2`.
+/// The length of the steps of [`Algorithm::Gradient`]: `c1/(c2 + l)` in iteration l = 0, 1, …; `c1` if there is no
+/// `c2`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Step {
     /// Above 0. 1 takes each parameter alone to its minimum.
@@ -71,7 +72,8 @@ impl Search {
     /// Checks the numbers, and that a start that is given has a value for each of the parameters, of these names.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a tolerance or step constant that is not positive, or initial parameters of another length.
+    /// [`Error::Argument`] for a tolerance or step constant that is not positive, or initial parameters of another
+    /// length.
     pub fn check(&self, names: &[String]) -> Result<(), Error> {
         if let Some(initial) = &self.initial_parameters
             && (initial.len() != names.len() || !initial.iter().all(|value| value.is_finite()))

@@ -103,8 +103,8 @@ impl Orthogonal {
     }
 
     /// The least squares of this damping within the limits, by active sets (Lawson and Hanson, Solving Least Squares
-    /// Problems, 1974, chapter 23; Stark and Parker, Computational Statistics 10, 1995): a step goes as far as the first
-    /// limit, that coordinate is held there, and is let go again where the others have changed what it wants.
+    /// Problems, 1974, chapter 23; Stark and Parker, Computational Statistics 10, 1995): a step goes as far as the
+    /// first limit, that coordinate is held there, and is let go again where the others have changed what it wants.
     pub(super) fn solve_damped(&mut self, damping: f64, step: &mut [f64]) {
         let Self { size, triangle, work, limits, held, solved, .. } = self;
         let damping = damping.max(SMALLEST_DAMPING);

@@ -9,15 +9,16 @@ const SUFFICIENT: f64 = 1e-4;
 /// The longest step of any variable at first.
 const FIRST: f64 = 0.5;
 
-/// Goes down from `start` by the method of Broyden, Fletcher, Goldfarb and Shanno (1970), with steps that are halved until the function
-/// falls enough (Nocedal and Wright, Numerical Optimization, 2nd ed. 2006, section 6.1):
+/// Goes down from `start` by the method of Broyden, Fletcher, Goldfarb and Shanno (1970), with steps that are halved
+/// until the function falls enough (Nocedal and Wright, Numerical Optimization, 2nd ed. 2006, section 6.1):
 ///
 /// ```text
 /// x <- x + a p,  p = -H g,   H <- (I - r s y') H (I - r y s') + r s s',   s = a p, y the change of g, r = 1/(s'y)
 /// ```
 ///
-/// It ends where the decrease that the gradient promises falls below `tolerance`, or no step goes down. `function` gives the value and
-/// writes the gradient; a value that is no number is no way to go. Gives the variables and the value.
+/// It ends where the decrease that the gradient promises falls below `tolerance`, or no step goes down. `function`
+/// gives the value and writes the gradient; a value that is no number is no way to go. Gives the variables and the
+/// value.
 pub fn least(
     start: &[f64],
     tolerance: f64,

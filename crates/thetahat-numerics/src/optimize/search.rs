@@ -164,8 +164,8 @@ struct Descent<'o, O> {
     damping: f64,
     /// Whether it may go on by orthogonal transformations.
     may_turn: bool,
-    /// Trials that were refused as they are outside, whether there was one in the last iteration, and how many were drawn in in
-    /// vain.
+    /// Trials that were refused as they are outside, whether there was one in the last iteration, and how many were
+    /// drawn in in vain.
     unstable_steps: usize,
     stability_bound: bool,
     drawn_in: usize,
@@ -186,8 +186,8 @@ impl<O: Objective> Descent<'_, O> {
         found + free_gain
     }
 
-    /// Takes the full step that is there already, if it lowers the cost, and gives the cost then: where convergence is slow, it is
-    /// a good part of the way that is left.
+    /// Takes the full step that is there already, if it lowers the cost, and gives the cost then: where convergence is
+    /// slow, it is a good part of the way that is left.
     fn last_step(&mut self) -> Option<f64> {
         self.workspace.apply(self.objective, &self.parameters, 1.0);
         match self.cost_of_trial(0.0) {
@@ -219,8 +219,8 @@ impl<O: Objective> Descent<'_, O> {
         Rule::Halved
     }
 
-    /// Looks for a step that lowers the cost, and leaves where it leads in the trial of the workspace. None if no step does; then
-    /// the objective is back where the search stands.
+    /// Looks for a step that lowers the cost, and leaves where it leads in the trial of the workspace. None if no step
+    /// does; then the objective is back where the search stands.
     fn step(&mut self, rule: Rule, free_gain: f64) -> Option<Accepted> {
         self.stability_bound = false;
         let accepted = self.shortened(rule, free_gain);
@@ -291,8 +291,8 @@ impl<O: Objective> Descent<'_, O> {
         }
     }
 
-    /// The cost of a trial that was drawn in, with the parameters solved for that errors are linear in. None if it is not below
-    /// that of the point where the search stands; then the objective is there again.
+    /// The cost of a trial that was drawn in, with the parameters solved for that errors are linear in. None if it is
+    /// not below that of the point where the search stands; then the objective is there again.
     fn on_border(&mut self) -> Option<f64> {
         let Workspace { trial, factor, moved, .. } = &mut self.workspace;
         if let Ok(cost) = solve_linear(self.objective, trial, factor, moved)

@@ -16,7 +16,8 @@ pub fn best_free<O: Objective>(objective: &mut O, parameters: &[f64]) -> Result<
     objective.evaluate(parameters)
 }
 
-/// The same with the parameters solved for that e is linear in where the others are given. Writes them into `parameters`.
+/// The same with the parameters solved for that e is linear in where the others are given. Writes them into
+/// `parameters`.
 pub fn best_linear<O: Objective>(objective: &mut O, parameters: &mut [f64]) -> Result<f64, O::Refusal> {
     let size = parameters.len();
     solve_linear(objective, parameters, &mut vec![0.0; size * size], &mut vec![0.0; size])
@@ -52,8 +53,8 @@ pub(super) fn solve_linear_here<O: Objective>(
     objective.evaluate(parameters)
 }
 
-/// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order; none where there are no
-/// normal equations.
+/// By how much a full Gauss-Newton step from what was evaluated last would lower the cost, to first order; none where
+/// there are no normal equations.
 pub fn predicted_decrease<O: Objective>(objective: &mut O) -> f64 {
     let Ok(free_gain) = objective.linearize() else { return 0.0 };
     let (mut factor, mut step) = (objective.matrix().to_vec(), objective.right().to_vec());

@@ -53,8 +53,8 @@ impl Workspace {
         }
     }
 
-    /// Scales the normal equations so that the matrix has a unit diagonal, and solves them. Gives the decrease of the cost
-    /// that the solution predicts.
+    /// Scales the normal equations so that the matrix has a unit diagonal, and solves them. Gives the decrease of the
+    /// cost that the solution predicts.
     pub(super) fn scale(&mut self, objective: &mut impl Objective, parameters: &[f64]) -> f64 {
         if let Some(orthogonal) = &mut self.orthogonal {
             if let Some(predicted) = orthogonal.scale(objective, parameters, &mut self.right, &mut self.step)
@@ -116,7 +116,8 @@ impl Workspace {
 
     /// `(H + damping I) step = g` with the least damping, in tenfold steps, that makes the matrix positive definite.
     ///
-    /// H comes from central differences of g, one-sided ones beside the border of where there is a cost: 2 p linearizations.
+    /// H comes from central differences of g, one-sided ones beside the border of where there is a cost: 2 p
+    /// linearizations.
     pub(super) fn newton_step(&mut self, objective: &mut impl Objective, parameters: &[f64], cost: f64) {
         let size = self.scales.len();
         let cost = objective.scale(cost);

@@ -359,8 +359,8 @@ impl<'p> Subspace<'p> {
     }
 }
 
-/// What an orthonormal basis leaves of a vector, and what it takes of it: Gram-Schmidt, twice (Björck, Numerical Methods
-/// for Least Squares Problems, 1996, section 2.4).
+/// What an orthonormal basis leaves of a vector, and what it takes of it: Gram-Schmidt, twice (Björck, Numerical
+/// Methods for Least Squares Problems, 1996, section 2.4).
 fn without(basis: &[DVector<f64>], vector: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
     let mut rest = vector.clone();
     let mut weights = vec![0.0; basis.len()];

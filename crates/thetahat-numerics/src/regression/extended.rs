@@ -1,9 +1,10 @@
 //! Normal equations in twice the precision: those of parts of the data add up, and are solved once.
 //!
-//! The Gram matrix has the square of the condition number kappa of its regressors, and rounding of eps in it becomes eps kappa^2 in
-//! the solution. Residuals of the data correct that (see `solve`), but here the data are gone. In numbers of twice the precision, with
-//! eps^2 = 1e-32, the same becomes eps^2 kappa^2, which is less than what rounding of the data themselves does, eps kappa, wherever
-//! they determine anything. So sums of products do what a triangular factor does, and
+//! The Gram matrix has the square of the condition number kappa of its regressors, and rounding of eps in it becomes
+//! eps kappa^2 in the solution. Residuals of the data correct that (see `solve`), but here the data are gone. In
+//! numbers of twice the precision, with eps^2 = 1e-32, the same becomes eps^2 kappa^2, which is less than what rounding
+//! of the data themselves does, eps kappa, wherever they determine anything. So sums of products do what a triangular
+//! factor does, and
 //!
 //! ```text
 //! add up: S(1 and 2) = S(1) + S(2), whatever the order, to 1e-31;
@@ -13,8 +14,9 @@
 //!
 //! The last needs (offset/standard deviation)^2 digits, of which there are 32.
 //!
-//! Source: Björck, Numerical Methods for Least Squares Problems, 1996, sections 2.2 and 2.8 (normal equations, and their accumulation in
-//! higher precision); Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18 (1971).
+//! Source: Björck, Numerical Methods for Least Squares Problems, 1996, sections 2.2 and 2.8 (normal equations, and
+//! their accumulation in higher precision); Dekker, A floating-point technique for extending the available precision,
+//! Numerische Mathematik 18 (1971).
 
 mod monomials;
 
@@ -209,8 +211,9 @@ impl ExtendedGram {
         (products, centred.then(|| DVector::from_fn(size, |row, _| mean(columns[row]))))
     }
 
-    /// The means of the products of combinations of some columns, C S C' / N, if `centred` of their deviations from their means. In all digits:
-    /// what combinations leave of the columns may be much smaller than these. O(p^2) for each combination of p columns.
+    /// The means of the products of combinations of some columns, C S C' / N, if `centred` of their deviations from
+    /// their means. In all digits: what combinations leave of the columns may be much smaller than these. O(p^2) for
+    /// each combination of p columns.
     pub fn mean_products_of(
         &self,
         columns: &[Column],

@@ -20,12 +20,14 @@ pub fn add_filtered(target: &mut [f64], rows: &Range<usize>, weights: &[f64], x:
     }
 }
 
-/// x = w/A from rest, in place: `x(t) = w(t) - a1 x(t-1) - … - an x(t-n)`, `monic` being 1, a1 … an. 2 n flops a sample.
+/// x = w/A from rest, in place: `x(t) = w(t) - a1 x(t-1) - … - an x(t-n)`, `monic` being 1, a1 … an. 2 n flops a
+/// sample.
 pub fn divide(monic: &[f64], values: &mut [f64]) {
     divide_together(monic, [values]);
 }
 
-/// The same for several signals of one length. A sample waits for the one before it; side by side, signals wait together.
+/// The same for several signals of one length. A sample waits for the one before it; side by side, signals wait
+/// together.
 pub fn divide_together<const K: usize>(monic: &[f64], signals: [&mut [f64]; K]) {
     match *monic {
         [] | [_] => {}

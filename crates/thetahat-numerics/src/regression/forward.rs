@@ -1,15 +1,15 @@
 //! Forward regression: the term that explains most of what is left comes next.
 //!
-//! With the columns orthogonalised as they are chosen (Chen, Billings and Luo, Orthogonal least squares methods and their application
-//! to non-linear system identification, Int. J. Control 50, 1989), all that is needed of the columns are their products. With
-//! d_j = phi_j' phi_j and c_j = phi_j' y at the start, the choice of s makes
+//! With the columns orthogonalised as they are chosen (Chen, Billings and Luo, Orthogonal least squares methods and
+//! their application to non-linear system identification, Int. J. Control 50, 1989), all that is needed of the columns
+//! are their products. With d_j = phi_j' phi_j and c_j = phi_j' y at the start, the choice of s makes
 //!
 //! ```text
 //! z = c_s/sqrt(d_s),   r_j = (phi_s' phi_j - sum over the chosen i of r_is r_ij)/sqrt(d_s),   d_j -= r_j^2,   c_j -= r_j z
 //! ```
 //!
-//! which is a Cholesky factor of the Gram matrix with its pivots chosen by what they explain. The error reduction ratio of s is
-//! z^2/(y'y). Cost: O(M K^2) for K of M terms.
+//! which is a Cholesky factor of the Gram matrix with its pivots chosen by what they explain. The error reduction ratio
+//! of s is z^2/(y'y). Cost: O(M K^2) for K of M terms.
 
 /// A term of which less than this fraction of its square is orthogonal to the chosen ones is one of their sums.
 const ALIASED: f64 = 1e-11;
@@ -64,9 +64,10 @@ impl Path {
     }
 }
 
-/// Chooses `most` terms at most; fewer where no other is left, or nothing is left to explain. `gram` gives the product of two
-/// candidates, `cross` that of each with the target, whose square is `energy`. Those of `first` are taken first, in their order, as far
-/// as they are no sums of others. Ties go to the candidate that comes first in `preferred`: it gives a rank for each.
+/// Chooses `most` terms at most; fewer where no other is left, or nothing is left to explain. `gram` gives the product
+/// of two candidates, `cross` that of each with the target, whose square is `energy`. Those of `first` are taken first,
+/// in their order, as far as they are no sums of others. Ties go to the candidate that comes first in `preferred`: it
+/// gives a rank for each.
 pub fn forward(
     gram: impl Fn(usize, usize) -> f64,
     cross: &[f64],

@@ -154,7 +154,8 @@ impl Products {
         }
     }
 
-    /// Adds the sum of each lagged signal over the samples `rows`, all lags of which are there, at its position. O(N + p).
+    /// Adds the sum of each lagged signal over the samples `rows`, all lags of which are there, at its position. O(N +
+    /// p).
     pub(super) fn add_sums(&self, signals: &[&[f64]], rows: &Range<usize>, sums: &mut [fx128]) {
         for &Span { signal, low, high, offset } in &self.spans {
             let x = signals[signal];
@@ -198,8 +199,8 @@ impl Products {
     }
 }
 
-/// The Gram matrix of z(t), z(t-1), …, z(t-L) over the samples of which all lags lie in their segment, z being the values of all signals,
-/// and how many these samples are. O(N q^2 L) time for q signals, O(q^2 L^2) memory.
+/// The Gram matrix of z(t), z(t-1), …, z(t-L) over the samples of which all lags lie in their segment, z being the
+/// values of all signals, and how many these samples are. O(N q^2 L) time for q signals, O(q^2 L^2) memory.
 pub fn joint_gram(signals: &[&[f64]], segments: &[Range<usize>], longest: usize) -> (DMatrix<f64>, usize) {
     let taps = |signal| Taps { signal, first: 0, count: longest + 1, sign: 1.0 };
     let taps: Vec<Taps> = (0..signals.len()).map(taps).collect();

@@ -44,7 +44,8 @@ pub fn product(x: &[f64], y: &[f64]) -> f64 {
 
 /// `x'y` in twice the precision. 17 flops a sample, five times what [`product`] takes.
 ///
-/// Source: Ogita, Rump and Oishi, Accurate sum and dot product, SIAM Journal on Scientific Computing 26 (2005), algorithm 5.3 (Dot2).
+/// Source: Ogita, Rump and Oishi, Accurate sum and dot product, SIAM Journal on Scientific Computing 26 (2005),
+/// algorithm 5.3 (Dot2).
 pub fn extended_product(x: &[f64], y: &[f64]) -> fx128 {
     let chunks = x.chunks(TERMS).zip(y.chunks(TERMS));
     chunks.fold(fx128::ZERO, |sum, (x, y)| {
@@ -216,7 +217,8 @@ fn sum_of(values: &[f64], term: impl Fn(f64) -> f64) -> f64 {
     fold(sum)
 }
 
-/// The sums of squares and of sizes of x - y, with the bits of [`sum`], and the largest size; NaN if one is. 5 flops a sample.
+/// The sums of squares and of sizes of x - y, with the bits of [`sum`], and the largest size; NaN if one is. 5 flops a
+/// sample.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2"))]
 pub fn differences(x: &[f64], y: &[f64]) -> [f64; 3] {
     let ((x, x_rest), (y, y_rest)) = (x.as_chunks::<LANES>(), y.as_chunks::<LANES>());

@@ -53,8 +53,8 @@ impl<'a> Lagged<'a> {
         Self { signals: signals.to_vec(), taps, segments, initial, longest }
     }
 
-    /// Leaves out the first `first` samples of each segment, those with a full regressor too; all samples count still where
-    /// zeros stand before a segment.
+    /// Leaves out the first `first` samples of each segment, those with a full regressor too; all samples count still
+    /// where zeros stand before a segment.
     pub fn after(self, first: usize) -> Self {
         Self { longest: self.longest.max(first), ..self }
     }

@@ -5,8 +5,9 @@
 //! S(1 and 2) = S(1) + S(2) + N_1 N_2/(N_1 + N_2) d d',   d = m(2) - m(1)
 //! ```
 //!
-//! Each lag has the mean of its own rows, as a regression with a constant takes it. A part is summed about its own means and none of
-//! the sums is a difference of large ones, so that levels cost no digits, whatever they are and however they move.
+//! Each lag has the mean of its own rows, as a regression with a constant takes it. A part is summed about its own
+//! means and none of the sums is a difference of large ones, so that levels cost no digits, whatever they are and
+//! however they move.
 //!
 //! Source: Chan, Golub and LeVeque, Algorithms for computing the sample variance, The American Statistician 37 (1983).
 
@@ -106,8 +107,8 @@ impl LaggedMoments {
         self.products[(place(left), place(right))]
     }
 
-    /// `Phi' Phi`, `Phi' y` and `y' y` of the regression of one signal on lags of some, and on a constant, which is eliminated. The
-    /// signals of the taps count among `signals`, the first of which is y.
+    /// `Phi' Phi`, `Phi' y` and `y' y` of the regression of one signal on lags of some, and on a constant, which is
+    /// eliminated. The signals of the taps count among `signals`, the first of which is y.
     pub fn normal_equations(&self, signals: &[usize], taps: &[Taps]) -> (DMatrix<f64>, DVector<f64>, f64) {
         let columns: Vec<((usize, usize), f64)> = taps
             .iter()

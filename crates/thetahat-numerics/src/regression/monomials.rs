@@ -1,9 +1,10 @@
 //! Monomials of variables, and their Gram matrix from moments.
 //!
-//! The product of two monomials of degree d at most is one of degree 2 d at most, so that the Gram matrix of M monomials of n
-//! variables holds C(n + 2 d, 2 d) different numbers, and no matrix of regressors is needed. With x_0 = 1 a monomial is a tuple
-//! i_1 <= … <= i_d of indices, 0 where there is no further factor. A moment is a tuple of 2 d such indices; it is the product of its
-//! first half, whose last index is c, and of its second half, whose first index is not below c:
+//! The product of two monomials of degree d at most is one of degree 2 d at most, so that the Gram matrix of M
+//! monomials of n variables holds C(n + 2 d, 2 d) different numbers, and no matrix of regressors is needed. With x_0 =
+//! 1 a monomial is a tuple i_1 <= … <= i_d of indices, 0 where there is no further factor. A moment is a tuple of 2 d
+//! such indices; it is the product of its first half, whose last index is c, and of its second half, whose first index
+//! is not below c:
 //!
 //! ```text
 //! moments with i_d = c:   sum_t A_c(t) B_c(t)',   A_c the monomials that end with c, B_c those that begin with c or later
@@ -37,7 +38,8 @@ pub struct Monomials {
     places: HashMap<Vec<u16>, usize>,
     /// For each tuple the tile that it is in as a first half, and its row there.
     rows: Vec<(usize, usize)>,
-    /// For each tile the monomials of its rows, and the first monomial of its columns, which end with the last monomial.
+    /// For each tile the monomials of its rows, and the first monomial of its columns, which end with the last
+    /// monomial.
     tiles: Vec<(Vec<usize>, usize)>,
 }
 

@@ -48,7 +48,8 @@ pub enum Solver {
     NormalEquations,
     /// Householder reflections on blocks of rows: where the regressors are nearly dependent.
     Qr,
-    /// Cholesky of the Gram matrix in twice the precision: where the rows are gone, as those of pieces that were merged.
+    /// Cholesky of the Gram matrix in twice the precision: where the rows are gone, as those of pieces that were
+    /// merged.
     ExtendedPrecision,
 }
 
@@ -79,7 +80,8 @@ pub enum Unsolved {
 impl Lagged<'_> {
     /// The normal equations Phi' Phi theta = Phi' y, and y' y. O(N p).
     ///
-    /// With the instruments among the columns, the block Z' Phi of an instrumental-variable system is a part of Phi' Phi.
+    /// With the instruments among the columns, the block Z' Phi of an instrumental-variable system is a part of Phi'
+    /// Phi.
     pub fn normal_equations(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
         gram(self)
     }

@@ -7,8 +7,8 @@ use super::kernel::{product, sum_of_squares};
 /// What is left of a column below this fraction of it is rounding: it depends on those before it.
 const DEPENDENT: f64 = 1e-10;
 
-/// An orthonormal basis of columns, each taken out of what comes after it twice (Gram and Schmidt; Björck, Numerical Methods for Least
-/// Squares Problems, 1996, section 2.4.5). A column that depends on those before it is left out.
+/// An orthonormal basis of columns, each taken out of what comes after it twice (Gram and Schmidt; Björck, Numerical
+/// Methods for Least Squares Problems, 1996, section 2.4.5). A column that depends on those before it is left out.
 #[derive(Debug, Clone, Default)]
 pub struct Span {
     basis: Vec<Vec<f64>>,

@@ -253,7 +253,8 @@ impl Iterator for Batches {
     }
 }
 
-/// Does what reads a file, whose libraries panic about some damages: that is an error as any other, and nothing is printed.
+/// Does what reads a file, whose libraries panic about some damages: that is an error as any other, and nothing is
+/// printed.
 fn guarded<T>(work: impl FnOnce() -> Result<T, ArrowError>) -> Result<T, ArrowError> {
     thread_local! {
         static GUARDED: Cell<bool> = const { Cell::new(false) };
@@ -314,8 +315,8 @@ fn directory(mut file: &File, length: u64) -> io::Result<Option<Vec<u8>>> {
     Ok(Some(directory))
 }
 
-/// What the pages of the columns take that are unpacked at once, in the group of rows where that is most: of each column its first
-/// one, which may be its dictionary, and the largest of the others.
+/// What the pages of the columns take that are unpacked at once, in the group of rows where that is most: of each
+/// column its first one, which may be its dictionary, and the largest of the others.
 fn largest_pages(mut file: &File, metadata: &ArrowReaderMetadata, mask: &ProjectionMask) -> io::Result<u64> {
     let mut most = 0;
     let mut header = Vec::new();

@@ -31,8 +31,8 @@ enum Ticks {
 }
 
 impl Clock {
-    /// Decides by the type of a column, of which this has the first row. Instants count from `start`, or from the first one. An error is
-    /// a message about the first row.
+    /// Decides by the type of a column, of which this has the first row. Instants count from `start`, or from the first
+    /// one. An error is a message about the first row.
     pub(super) fn decide(
         kind: &Kind,
         array: &dyn Array,

@@ -1,9 +1,9 @@
-//! The directory of a Parquet file, whose numbers are looked at before they are believed: how deep it is nested, how many
-//! elements its lists have, how many children a column has. Its reader takes memory, and stack, for as many.
+//! The directory of a Parquet file, whose numbers are looked at before they are believed: how deep it is nested, how
+//! many elements its lists have, how many children a column has. Its reader takes memory, and stack, for as many.
 //!
-//! It is a struct in the compact protocol of Thrift: fields of a type and a number, lists with a count, integers of seven bits a byte
-//! (Apache Thrift, Thrift Compact protocol encoding). Only the schema, field 2, is looked into:
-//! a list of columns before their children, each with the count of these in field 5.
+//! It is a struct in the compact protocol of Thrift: fields of a type and a number, lists with a count, integers of
+//! seven bits a byte (Apache Thrift, Thrift Compact protocol encoding). Only the schema, field 2, is looked into: a
+//! list of columns before their children, each with the count of these in field 5.
 
 /// Structs and lists in each other; the format itself needs seven.
 const DEPTH: usize = 32;
@@ -37,7 +37,8 @@ pub(super) fn fault(directory: &[u8]) -> Option<&'static str> {
     None
 }
 
-/// The header of a page: its own length, the bytes that the page has unpacked, and as it is stored. None where it is cut.
+/// The header of a page: its own length, the bytes that the page has unpacked, and as it is stored. None where it is
+/// cut.
 pub(super) fn page(bytes: &[u8]) -> Option<(u64, u64, u64)> {
     let mut thrift = Thrift { bytes, children: Vec::new() };
     let (mut field, mut unpacked, mut stored) = (0, 0, 0);

@@ -1,8 +1,9 @@
 //! The messages of an Arrow stream or file, each whole, of which none is believed to hold more than its bytes do.
 //!
-//! A compressed buffer begins with the length that it will have; its reader takes memory for as much, and a length that is made up ends
-//! the process. So whatever is not small is unpacked here first, into nothing, and counted. What is packed well may still be more than
-//! there is memory for: a batch is held against the bound of the reader before it is unpacked.
+//! A compressed buffer begins with the length that it will have; its reader takes memory for as much, and a length that
+//! is made up ends the process. So whatever is not small is unpacked here first, into nothing, and counted. What is
+//! packed well may still be more than there is memory for: a batch is held against the bound of the reader before it is
+//! unpacked.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -63,7 +64,8 @@ impl Limits {
         }
     }
 
-    /// That there is memory for what is in the body of a message, and that its compressed buffers are as long as they say.
+    /// That there is memory for what is in the body of a message, and that its compressed buffers are as long as they
+    /// say.
     fn check(&mut self, message: &Message<'_>, body: &[u8]) -> io::Result<()> {
         let dictionary = message.header_as_dictionary_batch();
         let values = dictionary.and_then(|dictionary| dictionary.data());
@@ -165,7 +167,8 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Those of the file, the dictionaries looked at. None where there is no directory, which the reader of the file says.
+    /// Those of the file, the dictionaries looked at. None where there is no directory, which the reader of the file
+    /// says.
     pub(super) fn of(mut file: File, limits: Limits) -> io::Result<Option<Self>> {
         let mut end = [0; 10];
         let length = file.seek(SeekFrom::End(0))?;

@@ -206,8 +206,8 @@ fn keys(array: &dyn Array) -> Vec<Option<usize>> {
     keys.map(|(row, key)| dictionary.keys().is_valid(row).then_some(key)).collect()
 }
 
-/// digits / 10^scale, rounded once: both are exact in `f64` (Clinger, How to read floating point numbers accurately, 1990,
-/// section 2), or the number is read from its text.
+/// digits / 10^scale, rounded once: both are exact in `f64` (Clinger, How to read floating point numbers accurately,
+/// 1990, section 2), or the number is read from its text.
 fn decimal(digits: i128, scale: i8) -> f64 {
     const POWERS: i8 = 22;
     if digits.unsigned_abs() <= u128::from(EXACT) && (0..=POWERS).contains(&scale) {

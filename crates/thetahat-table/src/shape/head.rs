@@ -143,8 +143,8 @@ impl Head {
 }
 
 impl Lines<'_> {
-    /// The length of the sign in front of names that makes a comment of them, with the blanks after it. It is zero where
-    /// no blank follows: then the sign may be part of the first name.
+    /// The length of the sign in front of names that makes a comment of them, with the blanks after it. It is zero
+    /// where no blank follows: then the sign may be part of the first name.
     fn marker(&self, line: &Line) -> usize {
         let text = &self.text[line.start..];
         let blanks = |text: &[u8]| text.iter().take_while(|byte| matches!(byte, b' ' | b'\t')).count();

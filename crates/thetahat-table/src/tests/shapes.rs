@@ -1,4 +1,5 @@
-//! Logs as people have them: titles above the names, units below, blanks, words for on and off, numbers in other notations.
+//! Logs as people have them: titles above the names, units below, blanks, words for on and off, numbers in other
+//! notations.
 
 use super::*;
 

@@ -65,7 +65,8 @@ impl Closed {
         })
     }
 
-    /// The gain margin, where the phase passes -180 degrees with |L| below 1, and the phase margin in degrees, where |L| falls through 1.
+    /// The gain margin, where the phase passes -180 degrees with |L| below 1, and the phase margin in degrees,
+    /// where |L| falls through 1.
     fn margins(&self) -> (Option<f64>, Option<f64>) {
         let (mut gain, mut phase): (Option<f64>, Option<f64>) = (None, None);
         let least = |kept: Option<f64>, found: f64| Some(kept.map_or(found, |kept| kept.min(found)));

@@ -28,8 +28,8 @@ pub struct Control {
     pub sample_time: f64,
     /// The controller.
     pub controller: Polynomials,
-    /// K of u = -K x, of the linear-quadratic designs: the state is that of the controllable form, x_i(t) = w(t-i) with A(q) w = q^-1 u and
-    /// y = b_1 x_1 + b_2 x_2 + …; with an integrator of A (1 - q^-1), and u is its change.
+    /// K of u = -K x, of the linear-quadratic designs: the state is that of the controllable form, x_i(t) = w(t-i) with
+    /// A(q) w = q^-1 u and y = b_1 x_1 + b_2 x_2 + …; with an integrator of A (1 - q^-1), and u is its change.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_feedback: Option<Vec<f64>>,
     /// What the loop with the model does.
@@ -41,8 +41,8 @@ pub struct Control {
     pub warnings: Vec<String>,
 }
 
-/// R(q) u(t) = T(q) u_c(t) - S(q) y(t), coefficients in rising powers of q^-1. Beyond its limits A_o v = T u_c - S y + (A_o - R) u, u = v within
-/// them.
+/// R(q) u(t) = T(q) u_c(t) - S(q) y(t), coefficients in rising powers of q^-1. Beyond its limits A_o v = T u_c - S y +
+/// (A_o - R) u, u = v within them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Polynomials {
     /// R, monic.
@@ -68,7 +68,8 @@ pub struct Loop {
     pub poles: Vec<Root>,
     /// Whether all of them lie inside the unit circle.
     pub stable: bool,
-    /// Ms, the largest of 1/|1 + L|, L = B S/(A R): by so much noise and errors of the model grow at worst. 1.2 to 2 is usual.
+    /// Ms, the largest of 1/|1 + L|, L = B S/(A R): by so much noise and errors of the model grow at worst. 1.2 to 2 is
+    /// usual.
     pub peak_sensitivity: f64,
     /// Mt, the largest of |L/(1 + L)|.
     pub peak_complementary_sensitivity: f64,

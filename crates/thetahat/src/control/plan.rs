@@ -30,8 +30,8 @@ const LARGEST_UNSTABLE_SHARE: f64 = 0.01;
 /// What a controller is designed for.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Design {
-    /// The poles of the response to the set point, in the z plane, with their conjugates. At most as many as the plant has; those that are not
-    /// given are at 0.
+    /// The poles of the response to the set point, in the z plane, with their conjugates. At most as many as the plant
+    /// has; those that are not given are at 0.
     Poles(Vec<Complex<f64>>),
     /// The least sum of y² + ρ u² (with an integrator of u's changes), by the Riccati equation.
     Quadratic {
@@ -54,8 +54,9 @@ pub struct ControlPlan {
     pub input: Option<String>,
     /// The output that it holds; none: the only one.
     pub output: Option<String>,
-    /// The roots of A_o, how errors and noise are forgotten. None: the zeros of the noise model, which is what a Kalman filter of the model
-    /// has, the slowest of them where there are more than the controller can place. Minimum variance has no other.
+    /// The roots of A_o, how errors and noise are forgotten. None: the zeros of the noise model, which is what a Kalman
+    /// filter of the model has, the slowest of them where there are more than the controller can place. Minimum
+    /// variance has no other.
     pub observer: Option<Vec<Complex<f64>>>,
     /// Whether the controller integrates, so that loads and errors of the gain leave no error.
     pub integrator: bool,
@@ -86,18 +87,19 @@ impl ControlPlan {
 /// minimum variance    C = A D F + q^-d G,  R = B' F + rho/b_0 C/D,  S = G,  T = C
 /// ```
 ///
-/// A model in state space gives A, B and C by its poles and zeros, a process held from sample to sample its transfer function. Of what
-/// says nothing of its noise the measurements are taken for noisy: C = A.
+/// A model in state space gives A, B and C by its poles and zeros, a process held from sample to sample its transfer
+/// function. Of what says nothing of its noise the measurements are taken for noisy: C = A.
 ///
-/// Parameters are drawn from the normal distribution of the estimate, the model of each with the same controller: the share of
-/// stable loops says whether the log was enough for this design.
+/// Parameters are drawn from the normal distribution of the estimate, the model of each with the same controller: the
+/// share of stable loops says whether the log was enough for this design.
 ///
 /// Source: Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, chapters 5, 11 and 12.
 ///
 /// # Errors
-/// [`Error::Argument`] for a model that is not linear or in continuous time, channels that are not there, poles outside of the unit circle
-/// or without their conjugates, weights and limits out of their range, and designs that the model does not allow: factors that A and B share, zeros
-/// outside of the unit circle to be cancelled, an input that acts at once.
+/// [`Error::Argument`] for a model that is not linear or in continuous time, channels that are not there, poles outside
+/// of the unit circle or without their conjugates, weights and limits out of their range, and designs that the model
+/// does not allow: factors that A and B share, zeros outside of the unit circle to be cancelled, an input that acts at
+/// once.
 ///
 /// ```
 /// use thetahat::control::{ControlPlan, Design, control};

@@ -100,7 +100,8 @@ fn minimum_variance_has_the_least_deviation() -> Result<(), Error> {
     Ok(())
 }
 
-/// L = k q^-1/(1 - q^-1): the gain may grow to 2/k, and the phase margin at |L| = 1 is 90 - w/2 degrees with k = 2 sin(w/2).
+/// L = k q^-1/(1 - q^-1): the gain may grow to 2/k, and the phase margin at |L| = 1 is 90 - w/2 degrees with k = 2
+/// sin(w/2).
 #[test]
 fn margins_are_those_of_an_integrator() -> Result<(), Error> {
     let plant = plant::Plant {

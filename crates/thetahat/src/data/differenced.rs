@@ -6,8 +6,8 @@ use super::Record;
 
 /// The changes y(t) - y(t-1) and u_j(t) - u_j(t-1) of a record, at the places of the samples that they lead to.
 ///
-/// What is constant is gone from them, and a random walk has become white noise: (1 - q^-1) on both sides of a model leaves its plant as
-/// it is (Ljung, System Identification, 2nd ed. 1999, section 14.1).
+/// What is constant is gone from them, and a random walk has become white noise: (1 - q^-1) on both sides of a model
+/// leaves its plant as it is (Ljung, System Identification, 2nd ed. 1999, section 14.1).
 pub(crate) struct Differenced {
     output: Vec<f64>,
     inputs: Vec<Vec<f64>>,

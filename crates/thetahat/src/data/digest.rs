@@ -12,8 +12,8 @@ use crate::Error;
 /// Values that are hashed together.
 const BLOCK: usize = 512;
 
-/// For each log of which this one is made, the digests of some channels in the rows that lie in it; empty for a log without such a
-/// row.
+/// For each log of which this one is made, the digests of some channels in the rows that lie in it; empty for a log
+/// without such a row.
 ///
 /// # Errors
 /// [`Error::Data`] for a channel that is not there.
@@ -40,8 +40,8 @@ pub(crate) fn inside(rows: &[Rows], part: &Range<usize>) -> Vec<Range<usize>> {
     each.collect()
 }
 
-/// A digest of some rows of a signal, and of where they stand in it: 32 hexadecimal digits of XXH3. Two signals have the same one if
-/// they have the same values there, bit for bit; that others share it has a probability of 1e-38.
+/// A digest of some rows of a signal, and of where they stand in it: 32 hexadecimal digits of XXH3. Two signals have
+/// the same one if they have the same values there, bit for bit; that others share it has a probability of 1e-38.
 pub(crate) fn digest(values: &[f64], rows: &[Range<usize>]) -> String {
     let mut hasher = XxHash3_128::new();
     let places = rows.iter().flat_map(|rows| [rows.start, rows.end]);

@@ -49,7 +49,8 @@ impl<'a> JointRecord<'a> {
         Ok(Self { inputs, outputs, segments: std::iter::once(0..length).collect() })
     }
 
-    /// The same with inputs that wait so many samples: sample t has u_j(t - delay). Segments begin with the first sample that has all of them.
+    /// The same with inputs that wait so many samples: sample t has u_j(t - delay). Segments begin with the first
+    /// sample that has all of them.
     pub(crate) fn delayed(self, delays: &[usize]) -> Self {
         let longest = delays.iter().copied().max().unwrap_or(0);
         let samples = self.outputs.first().map_or(0, |output| output.len());

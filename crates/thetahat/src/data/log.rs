@@ -12,8 +12,8 @@ use crate::figures::short;
 
 /// A step longer than this many medians starts a new segment.
 pub(crate) const GAP: f64 = 1.5;
-/// Where this part of the steps is longer, they are none: the log is one of two rates. Then a gap is longer than 1.5 of the step that
-/// all but a few have.
+/// Where this part of the steps is longer, they are none: the log is one of two rates. Then a gap is longer than 1.5 of
+/// the step that all but a few have.
 const TWO_RATES: f64 = 1.0 / 3.0;
 /// And these are so many at least.
 const LONG_STEPS: f64 = 5.0;
@@ -32,8 +32,8 @@ pub struct Channel {
 
 /// Channels on a common, uniform clock.
 ///
-/// Time is in seconds. Where the clock has a gap, or a sample is missing, a new segment starts; no method of this crate reaches
-/// across such a boundary. A missing output alone is no boundary to models that do not need past outputs.
+/// Time is in seconds. Where the clock has a gap, or a sample is missing, a new segment starts; no method of this crate
+/// reaches across such a boundary. A missing output alone is no boundary to models that do not need past outputs.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};
@@ -71,8 +71,8 @@ pub enum Interpolation {
     Hold,
     /// A straight line from one sample to the next.
     Linear,
-    /// Each channel its own: one that moves in steps holds its last value, a smooth one is read from straight lines. Not through a gap of
-    /// the clock.
+    /// Each channel its own: one that moves in steps holds its last value, a smooth one is read from straight lines.
+    /// Not through a gap of the clock.
     Auto,
 }
 
@@ -103,9 +103,9 @@ impl Log {
         })
     }
 
-    /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step;
-    /// a step over 1.5 medians starts a new segment. Where a third of all steps is longer, the log is one of two rates: then a step over
-    /// 1.5 of what all but a twentieth have.
+    /// A log with a clock: `time` in seconds, one value for each row. The sample time is the median step; a step over
+    /// 1.5 medians starts a new segment. Where a third of all steps is longer, the log is one of two rates: then a step
+    /// over 1.5 of what all but a twentieth have.
     ///
     /// # Errors
     /// [`Error::Data`] as for [`Log::new`], if time is not finite, repeats or goes back, and if another step differs
@@ -116,8 +116,8 @@ impl Log {
         Ok(log)
     }
 
-    /// A log as it was recorded: its clock may be irregular. Models in equations take it as it is; what needs a uniform clock
-    /// refuses it with the error of [`with_time`](Self::with_time). Its sample time is the median step.
+    /// A log as it was recorded: its clock may be irregular. Models in equations take it as it is; what needs a uniform
+    /// clock refuses it with the error of [`with_time`](Self::with_time). Its sample time is the median step.
     ///
     /// # Errors
     /// [`Error::Data`] as for [`Log::new`], and if time is not finite, repeats or goes back.
@@ -173,12 +173,12 @@ impl Log {
         }
     }
 
-    /// Several logs as one: experiments with the same plant, one after the other. Rows are counted through all of them, and
-    /// no segment reaches from one to the next.
+    /// Several logs as one: experiments with the same plant, one after the other. Rows are counted through all of them,
+    /// and no segment reaches from one to the next.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is no log; [`Error::Data`] if one misses a channel that the first has, or its sample
-    /// time differs from the first's by more than 1 %.
+    /// [`Error::Argument`] if there is no log; [`Error::Data`] if one misses a channel that the first has, or its
+    /// sample time differs from the first's by more than 1 %.
     pub fn join(logs: Vec<Self>) -> Result<Self, Error> {
         let mut logs = logs.into_iter();
         let mut joined =
@@ -219,8 +219,8 @@ impl Log {
         Ok(joined)
     }
 
-    /// Some rows of some channels, as a log of its own with the same sample time. A line that was taken from a channel goes on
-    /// in it as in the whole log.
+    /// Some rows of some channels, as a log of its own with the same sample time. A line that was taken from a channel
+    /// goes on in it as in the whole log.
     ///
     /// # Errors
     /// [`Error::Data`] for a channel or rows that are not there.
@@ -296,7 +296,8 @@ impl Log {
         starts.zip(self.boundaries.iter().copied().chain([self.rows])).map(|(first, end)| first..end)
     }
 
-    /// The log with offsets taken from some channels, and without the others. A channel that is not there is missing in every row.
+    /// The log with offsets taken from some channels, and without the others. A channel that is not there is missing in
+    /// every row.
     pub(crate) fn deviations<'s>(
         &self,
         signals: impl Iterator<Item = (&'s str, Offset)>,
@@ -652,7 +653,8 @@ pub(crate) fn gap_of(limit: f64, long: f64, steps: f64, most: impl FnOnce() -> f
     if long >= LONG_STEPS && long >= TWO_RATES * steps { GAP * most() } else { limit }
 }
 
-/// Whether each time is finite and later than the one before. In blocks, so that the comparisons are made several at a time.
+/// Whether each time is finite and later than the one before. In blocks, so that the comparisons are made several at a
+/// time.
 pub(super) fn runs_forward(time: &[f64]) -> bool {
     const BLOCK: usize = 1024;
     let ends = [time.first(), time.last()];

@@ -96,8 +96,8 @@ fn usual_step(time: &[f64]) -> Option<f64> {
     (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// Whether clocks may be set at so many seconds after 1970: before five in the morning on a Sunday of a month in which some country
-/// sets them.
+/// Whether clocks may be set at so many seconds after 1970: before five in the morning on a Sunday of a month in which
+/// some country sets them.
 fn is_change(wall: f64) -> bool {
     let days = (wall / DAY).floor() as i64;
     let of_year = (days as f64).rem_euclid(365.2425) / 30.44;
@@ -148,7 +148,8 @@ impl Mended {
             let now = self.time[first];
             let next = self.time.get(first + count).filter(|next| **next > now);
             let before = first.checked_sub(1).map(|row| self.time[row]);
-            // The last run has no end, nor has one before the time goes back: its rows are as far apart as those before.
+            // The last run has no end, nor has one before the time goes back: its rows are as far apart as those
+            // before.
             let step = match (next, before) {
                 (Some(next), _) if run > 0 || count >= median => (next - now) / count as f64,
                 (Some(next), _) => (next - now) / median as f64,

@@ -1,8 +1,8 @@
 //! A band of frequencies in which errors count.
 //!
-//! Inputs and output go through the same causal filter L(q) before the fit, so that y = G u + v becomes L y = G (L u) + L v:
-//! the model still describes the signals as they are, and the fit makes the sum of the squares of L e small (Ljung, System
-//! Identification, 2nd ed. 1999, section 14.4). It weighs the errors in the frequency domain by |L|^2.
+//! Inputs and output go through the same causal filter L(q) before the fit, so that y = G u + v becomes L y = G (L u) +
+//! L v: the model still describes the signals as they are, and the fit makes the sum of the squares of L e small
+//! (Ljung, System Identification, 2nd ed. 1999, section 14.4). It weighs the errors in the frequency domain by |L|^2.
 //!
 //! L is a Butterworth filter (Butterworth 1930) of order n = 4 at each end of the band: with the poles
 //!
@@ -13,8 +13,8 @@
 //! ```
 //!
 //! taken to discrete time by the bilinear transformation z = (1 + s T/2)/(1 - s T/2) with the ends where they belong,
-//! w = (2/T) tan(pi f T) (Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd ed. 2010, section 7.2), in sections of
-//! second order. At the ends of the band the gain is 1/sqrt(2).
+//! w = (2/T) tan(pi f T) (Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd ed. 2010, section 7.2), in
+//! sections of second order. At the ends of the band the gain is 1/sqrt(2).
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -186,8 +186,8 @@ pub(crate) struct Prefiltered {
 }
 
 impl Prefiltered {
-    /// Filters the inputs and the output of a log alike, from the first row on of each segment in which all of them have a
-    /// value and the clock has no gap, as if its values had been there forever before.
+    /// Filters the inputs and the output of a log alike, from the first row on of each segment in which all of them
+    /// have a value and the clock has no gap, as if its values had been there forever before.
     ///
     /// # Errors
     /// [`Error::Argument`] for an end of the band that is not below half the sampling frequency; [`Error::Data`] for a
@@ -206,8 +206,8 @@ impl Prefiltered {
         Ok(Self { log: filtered, inputs: inputs.to_vec(), output: output.to_owned(), settling })
     }
 
-    /// The signals over some rows, without the beginning of each segment: the rows in which more than 1 % of the slowest mode
-    /// of the filter is there, but not more than a quarter of the segment.
+    /// The signals over some rows, without the beginning of each segment: the rows in which more than 1 % of the
+    /// slowest mode of the filter is there, but not more than a quarter of the segment.
     ///
     /// # Errors
     /// As for [`Log::record`].

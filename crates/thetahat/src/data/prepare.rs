@@ -53,7 +53,8 @@ impl Offset {
     /// The offset of a channel over segments of rows (0-based).
     ///
     /// # Errors
-    /// [`Error::Data`] if there are fewer rows than `Start` asks for; [`Error::Argument`] for a line through several logs.
+    /// [`Error::Data`] if there are fewer rows than `Start` asks for; [`Error::Argument`] for a line through several
+    /// logs.
     pub(crate) fn estimate(
         detrend: Detrend,
         log: &Log,

@@ -65,10 +65,11 @@ impl Log {
         self.record_between(inputs, output, rows, true)
     }
 
-    /// The same with segments that end only where a sample of an input is missing: where the output misses one, it is NaN.
+    /// The same with segments that end only where a sample of an input is missing: where the output misses one, it is
+    /// NaN.
     ///
-    /// For models of which the errors do not depend on past outputs, A = C = D = 1: they go on through such a hole, and the
-    /// errors in it do not count. And for free runs of any model.
+    /// For models of which the errors do not depend on past outputs, A = C = D = 1: they go on through such a hole, and
+    /// the errors in it do not count. And for free runs of any model.
     ///
     /// # Errors
     /// As for [`record`](Self::record).

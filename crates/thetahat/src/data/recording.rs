@@ -3,7 +3,8 @@
 use super::{Channel, Rows, check, checked};
 use crate::Error;
 
-/// A log as it was recorded: unlike a [`Log`](crate::data::Log) it may have an irregular clock. NaN means that the sample is missing.
+/// A log as it was recorded: unlike a [`Log`](crate::data::Log) it may have an irregular clock. NaN means that the
+/// sample is missing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// The channels, all as long.

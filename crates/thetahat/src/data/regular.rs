@@ -4,7 +4,8 @@ use std::fmt;
 
 use crate::figures::short;
 
-/// At most this many rows of a resampled log stand for each recorded one: with more, hardly anything in it was measured.
+/// At most this many rows of a resampled log stand for each recorded one: with more, hardly anything in it was
+/// measured.
 const MOST_GROWTH: f64 = 10.0;
 /// The step has the fewest digits within this fraction of the median.
 const ROUND_STEP: f64 = 0.02;
@@ -54,8 +55,8 @@ impl fmt::Display for Regular {
     }
 }
 
-/// The shortest step that one in twenty has and that does not make too many rows of a log: none where there is none. The steps are
-/// sorted.
+/// The shortest step that one in twenty has and that does not make too many rows of a log: none where there is none.
+/// The steps are sorted.
 pub(crate) fn coarser(time: &[f64], steps: &mut [f64]) -> Option<f64> {
     steps.sort_unstable_by(f64::total_cmp);
     let span = time.last()? - time.first()?;
@@ -65,8 +66,8 @@ pub(crate) fn coarser(time: &[f64], steps: &mut [f64]) -> Option<f64> {
     rounded.into_iter().find(|step| *step > 0.0 && span / step < MOST_GROWTH * time.len() as f64)
 }
 
-/// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their end,
-/// which is not the clock's.
+/// The number of fewest digits within `tolerance`: differences of times such as 0.3 and 0.29 have rounding at their
+/// end, which is not the clock's.
 pub(crate) fn shortest(value: f64, tolerance: f64) -> f64 {
     (0..17)
         .filter_map(|digits| format!("{value:.digits$e}").parse().ok())

@@ -1,21 +1,22 @@
 //! Logs on another clock: values read between samples, and decimation with an anti-alias filter.
 //!
 //! A signal that is sampled every T seconds says nothing of frequencies above 1/(2 T): what is there appears as lower
-//! frequencies (Shannon 1949). So a log that goes to a step T at least twice the recorded one T0 is low-pass filtered first,
+//! frequencies (Shannon 1949). So a log that goes to a step T at least twice the recorded one T0 is low-pass filtered
+//! first,
 //!
 //! ```text
 //! x'(t) = sum_m h(m) x(t + m) / sum_m h(m),   h(m) = 2 f T0 sinc(2 f T0 m) w(m/(M + 1)),   |m| <= M
 //! w(z) = I0(beta sqrt(1 - z^2)) / I0(beta)
 //! ```
 //!
-//! a windowed sinc with Kaiser's window (Kaiser 1974; Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd ed. 2010,
-//! section 7.6). It passes frequencies up to 0.8/(2 T) and is 60 dB down from 1/(2 T) on: f = 0.9/(2 T),
-//! beta = 0.1102 (60 - 8.7) and 2 M = (60 - 7.95)/(2.285 dw), dw = 0.2 pi T0/T being the width between the two. It has
-//! no phase. All channels are filtered alike, so that y = G u stays true of what is left: a linear filter commutes with G.
+//! a windowed sinc with Kaiser's window (Kaiser 1974; Oppenheim and Schafer, Discrete-Time Signal Processing, 3rd ed.
+//! 2010, section 7.6). It passes frequencies up to 0.8/(2 T) and is 60 dB down from 1/(2 T) on: f = 0.9/(2 T), beta =
+//! 0.1102 (60 - 8.7) and 2 M = (60 - 7.95)/(2.285 dw), dw = 0.2 pi T0/T being the width between the two. It has no
+//! phase. All channels are filtered alike, so that y = G u stays true of what is left: a linear filter commutes with G.
 //!
 //! Both sums go over the rows that are there: in which all channels have a value (Knutsson and Westin, Normalized and
-//! differential convolution, 1993), and none of them after a gap of the clock. At the end of a log they have about half of
-//! the weight; a row for which they have less than two fifths is missing.
+//! differential convolution, 1993), and none of them after a gap of the clock. At the end of a log they have about half
+//! of the weight; a row for which they have less than two fifths is missing.
 
 mod one_clock;
 
@@ -98,8 +99,9 @@ impl Resample {
         Self { step, interpolation, anti_alias: true }
     }
 
-    /// What puts a log of two rates on a uniform clock: the faster of them, or one up to four times slower where there would be more than
-    /// ten rows for each recorded one; each channel is read its own way. None for a log of one rate, and where none is slow enough.
+    /// What puts a log of two rates on a uniform clock: the faster of them, or one up to four times slower where there
+    /// would be more than ten rows for each recorded one; each channel is read its own way. None for a log of one rate,
+    /// and where none is slow enough.
     ///
     /// # Errors
     /// [`Error::Data`] if the times are not finite or do not rise.
@@ -123,8 +125,8 @@ impl Resample {
         Ok(step.map(|step| Self { step, interpolation: Interpolation::Auto, anti_alias: false }))
     }
 
-    /// The filter for a log with these times; none where it does not apply: for a step below twice the recorded one, and for
-    /// an irregular clock.
+    /// The filter for a log with these times; none where it does not apply: for a step below twice the recorded one,
+    /// and for an irregular clock.
     ///
     /// # Errors
     /// [`Error::Data`] if the times are not finite or do not rise.
@@ -144,8 +146,8 @@ impl Resample {
 }
 
 impl AntiAlias {
-    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1: of a filter that is longer than a log of so many rows, what
-    /// they can meet.
+    /// h(-M) … h(M) for a recorded step of this many seconds, of sum 1: of a filter that is longer than a log of so
+    /// many rows, what they can meet.
     fn weights(&self, recorded: f64, rows: usize) -> Vec<f64> {
         let half = (self.taps / 2) as f64;
         let beta = 0.1102 * (ATTENUATION - 8.7);
@@ -227,7 +229,8 @@ impl<'a> Filtered<'a> {
 }
 
 impl Log {
-    /// The log on a uniform clock: as it is, or one of two rates resampled as [`Resample::for_two_rates`] says, which is given with it.
+    /// The log on a uniform clock: as it is, or one of two rates resampled as [`Resample::for_two_rates`] says, which
+    /// is given with it.
     ///
     /// # Errors
     /// [`Error::Data`] with the first row whose step is another, for a log that is irregular otherwise.
@@ -242,9 +245,10 @@ impl Log {
 
     /// A uniform log read off one with another clock, every `how.step` seconds from its first sample on.
     ///
-    /// Without an anti-alias filter ([`Resample::filter_for`] says whether there is one) a value is missing where a sample that
-    /// it is read off is missing, and every interval between two samples is bridged, however long. With it the filtered
-    /// signals are read instead: a value is missing where too few samples are near, and in a gap of the clock.
+    /// Without an anti-alias filter ([`Resample::filter_for`] says whether there is one) a value is missing where a
+    /// sample that it is read off is missing, and every interval between two samples is bridged, however long. With it
+    /// the filtered signals are read instead: a value is missing where too few samples are near, and in a gap of the
+    /// clock.
     ///
     /// Cost: O(1) for each new value; with a filter 36 multiply-adds for each recorded one.
     ///
@@ -281,7 +285,8 @@ impl Log {
 /// The instants of a uniform clock at which logs are read.
 struct Grid {
     instants: Vec<f64>,
-    /// Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970 have seven decimals).
+    /// Samples on the grid are not missed by rounding: of decimal steps, and of large times (seconds since 1970 have
+    /// seven decimals).
     rounding: f64,
 }
 

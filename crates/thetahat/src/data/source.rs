@@ -27,7 +27,8 @@ impl Source {
     /// What a log is called that is no file.
     pub const IN_MEMORY: &str = "memory";
 
-    /// When a row was, so many seconds after the first one, as the first time is written: in ISO 8601. None where times are no dates.
+    /// When a row was, so many seconds after the first one, as the first time is written: in ISO 8601. None where times
+    /// are no dates.
     ///
     /// ```
     /// use thetahat::data::{Rows, Source};
@@ -54,7 +55,8 @@ impl Source {
         Some(text + first.zone)
     }
 
-    /// Seconds from the beginning of 1970 to the first time, as the clocks on the wall of its zone show it. None where times are no dates.
+    /// Seconds from the beginning of 1970 to the first time, as the clocks on the wall of its zone show it. None where
+    /// times are no dates.
     #[cfg(feature = "html")]
     pub(crate) fn wall_seconds(&self) -> Option<f64> {
         let wall = Start::of(self.start.as_deref()?)?.wall;

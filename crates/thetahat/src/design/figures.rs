@@ -15,11 +15,11 @@ pub struct SignalFigures {
     pub mean: f64,
     /// The root mean square of the deviations from it.
     pub rms: f64,
-    /// The largest deviation over their root mean square: 1 for two levels with mean in the middle, sqrt 2 for a sinusoid. None for
-    /// a constant.
+    /// The largest deviation over their root mean square: 1 for two levels with mean in the middle, sqrt 2 for a
+    /// sinusoid. None for a constant.
     pub crest_factor: Option<f64>,
-    /// The order of persistence of excitation, the mean being part of the signal: so many parameters it can tell apart. No more
-    /// than `highest`.
+    /// The order of persistence of excitation, the mean being part of the signal: so many parameters it can tell apart.
+    /// No more than `highest`.
     pub order: usize,
     /// The highest order tried: 50, or a fourth of the samples.
     pub highest: usize,
@@ -30,10 +30,10 @@ pub struct SignalFigures {
 impl SignalFigures {
     /// The figures of a signal with so many seconds between its samples.
     ///
-    /// The order of persistence of excitation is the rank of the matrix of mean products u(t - i) u(t - j), i, j = 0 … n - 1
-    /// (Ljung, System Identification, 2nd ed. 1999, section 13.2): a constant has 1, a sinusoid 2, k sinusoids 2 k, white
-    /// noise n. As for an [inspected](crate::inspect::Excitation) log it is not above the number of times that the signal
-    /// changes, here with its level. O(N n) for n = 50.
+    /// The order of persistence of excitation is the rank of the matrix of mean products u(t - i) u(t - j), i, j = 0 …
+    /// n - 1 (Ljung, System Identification, 2nd ed. 1999, section 13.2): a constant has 1, a sinusoid 2, k sinusoids 2
+    /// k, white noise n. As for an [inspected](crate::inspect::Excitation) log it is not above the number of times that
+    /// the signal changes, here with its level. O(N n) for n = 50.
     ///
     /// ```
     /// use thetahat::design::SignalFigures;
@@ -55,8 +55,8 @@ impl SignalFigures {
         Self { mean, rms, crest_factor, order, highest, spectrum }
     }
 
-    /// Between which frequencies nine tenths of the power lie, in radians per second: from where a twentieth is below to where a
-    /// twentieth is above. None where there is no spectrum.
+    /// Between which frequencies nine tenths of the power lie, in radians per second: from where a twentieth is below
+    /// to where a twentieth is above. None where there is no spectrum.
     pub fn main_band(&self) -> Option<[f64; 2]> {
         let mut powers = vec![0.0];
         for pair in self.spectrum.windows(2) {

@@ -4,11 +4,12 @@
 //! u(t) = sum_k cos(2 pi k t/P + phi_k),   k in some lines,   crest factor = max |u| / root mean square of u
 //! ```
 //!
-//! All lines have the same amplitude, so that only the phases are free. Schroeder's, from the group delay of a sweep (IEEE
-//! Transactions on Information Theory 16 (1970)), give about 1.7, random ones 2.7 to 3. From these as starts u is clipped, and the
-//! phases of what is left are taken with the old amplitudes, over and over, the clip coming closer to the peak (Van der Ouderaa,
-//! Schoukens and Renneboog, IEEE Transactions on Instrumentation and Measurement 37 (1988)). What is above the clip is taken off
-//! several times over: from the same starts peaks come out a hundredth lower on flat lines, and a tenth on logarithmic ones.
+//! All lines have the same amplitude, so that only the phases are free. Schroeder's, from the group delay of a sweep
+//! (IEEE Transactions on Information Theory 16 (1970)), give about 1.7, random ones 2.7 to 3. From these as starts u is
+//! clipped, and the phases of what is left are taken with the old amplitudes, over and over, the clip coming closer to
+//! the peak (Van der Ouderaa, Schoukens and Renneboog, IEEE Transactions on Instrumentation and Measurement 37 (1988)).
+//! What is above the clip is taken off several times over: from the same starts peaks come out a hundredth lower on
+//! flat lines, and a tenth on logarithmic ones.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
@@ -18,7 +19,8 @@ use thetahat_core::nalgebra::Complex;
 use thetahat_numerics::fourier::{self, Fft};
 use thetahat_numerics::random::Random;
 
-/// Pairs of starts: one transform serves two real signals, as real and imaginary parts. The first start has Schroeder's phases.
+/// Pairs of starts: one transform serves two real signals, as real and imaginary parts. The first start has Schroeder's
+/// phases.
 const PAIRS: u64 = 5;
 /// Rounds of clipping from each start, the fewest and the most, and samples for all of them together.
 const ROUNDS: [usize; 2] = [100, 1000];
@@ -28,9 +30,9 @@ const CLIP: [f64; 2] = [0.7, 0.999];
 /// What is above the clip is taken off so many times.
 const TAKEN: f64 = 8.0;
 
-/// One period of the sum with the lowest peak that was found, largest value 1. `lines` are numbers of periods in P samples,
-/// above 0 and below P/2. O(P log P) for each of at most 1000 rounds from 10 starts, which run in parallel; which of them
-/// wins does not depend on that.
+/// One period of the sum with the lowest peak that was found, largest value 1. `lines` are numbers of periods in P
+/// samples, above 0 and below P/2. O(P log P) for each of at most 1000 rounds from 10 starts, which run in parallel;
+/// which of them wins does not depend on that.
 pub(super) fn low_crest(lines: &[usize], period: usize, seed: u64) -> Vec<f64> {
     let [forward, inverse] = fourier::portable(period);
     let of = |pair| {

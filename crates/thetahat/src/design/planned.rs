@@ -1,14 +1,15 @@
 //! What an experiment would tell of a model, before it is made.
 //!
-//! With e of variance sigma^2 and psi = -de/dtheta, the covariance of a prediction error estimate with this noise is, for many
-//! samples,
+//! With e of variance sigma^2 and psi = -de/dtheta, the covariance of a prediction error estimate with this noise is,
+//! for many samples,
 //!
 //! ```text
 //! P = (M/sigma^2)^-1,   M = sum_t E psi(t) psi(t)'
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, sections 9.3 and 13.3; Goodwin and Payne, Dynamic System Identification, 1977,
-//! chapter 6). psi is what the input does to it plus what the noise does, and as the two are independent in open loop, so is M:
+//! (Ljung, System Identification, 2nd ed. 1999, sections 9.3 and 13.3; Goodwin and Payne, Dynamic System
+//! Identification, 1977, chapter 6). psi is what the input does to it plus what the noise does, and as the two are
+//! independent in open loop, so is M:
 //!
 //! ```text
 //! of the input, with x_j = B_j/F_j v_j, y = 1/A sum x_j:      of the noise:
@@ -20,12 +21,13 @@
 //! level: D(1)/C(1)                                            0
 //! ```
 //!
-//! The part of the input is a simulation of the model; that of the noise is N times a covariance, which sums of products of the
-//! impulse responses of 1/A, 1/C and 1/D give exactly, without any draw. The last row is the output's level: fits find it together
-//! with the parameters, or take it off before, and what a constant input tells goes into it.
+//! The part of the input is a simulation of the model; that of the noise is N times a covariance, which sums of
+//! products of the impulse responses of 1/A, 1/C and 1/D give exactly, without any draw. The last row is the output's
+//! level: fits find it together with the parameters, or take it off before, and what a constant input tells goes into
+//! it.
 //!
-//! Before the first sample the plant is at rest at the first value of the signal: v(t) = u(t) - u(0). With the level unknown no
-//! other value would change anything. Samples that a fit needs for its first regressors do not count.
+//! Before the first sample the plant is at rest at the first value of the signal: v(t) = u(t) - u(0). With the level
+//! unknown no other value would change anything. Samples that a fit needs for its first regressors do not count.
 
 use std::slice;
 
@@ -65,16 +67,17 @@ impl Sources {
     }
 }
 
-/// A model as it would be known after an experiment with these inputs, one for each of its own, as long as one another: the same
-/// parameters, with the standard errors of an estimate from as many samples, and with those of all that follows from them, poles,
-/// gains and time constants. The structure, the parameters and the noise are taken to be right; so is a linear plant.
+/// A model as it would be known after an experiment with these inputs, one for each of its own, as long as one another:
+/// the same parameters, with the standard errors of an estimate from as many samples, and with those of all that
+/// follows from them, poles, gains and time constants. The structure, the parameters and the noise are taken to be
+/// right; so is a linear plant.
 ///
 /// Cost: O(N p + p^3) for N samples and p parameters.
 ///
 /// # Errors
-/// [`Error::Argument`] if there is not one input for each of the model's, or the inputs differ in length; [`Error::Data`] if the
-/// model is not stable, has no inputs, no noise, or noise that never dies away, or a signal leaves the range of numbers;
-/// [`Error::Undetermined`] if the inputs leave the parameters open.
+/// [`Error::Argument`] if there is not one input for each of the model's, or the inputs differ in length;
+/// [`Error::Data`] if the model is not stable, has no inputs, no noise, or noise that never dies away, or a signal
+/// leaves the range of numbers; [`Error::Undetermined`] if the inputs leave the parameters open.
 ///
 /// ```
 /// use thetahat::data::Record;

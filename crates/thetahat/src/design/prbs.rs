@@ -6,17 +6,18 @@
 //! a(t + n) = a(t) + sum_k a(t + k)   modulo 2,   k the other powers of a primitive polynomial x^n + … + 1,
 //! ```
 //!
-//! goes through all 2^n - 1 states but zero before it comes back (Golomb, Shift Register Sequences, 1967; Söderström and Stoica,
-//! System Identification, 1989, section 5.3). With s(t) = 1 - 2 a(t) the sum over a period of L = 2^n - 1 is -1, and the
-//! autocorrelation (1/L) sum_t s(t) s(t + k) is 1 for k = 0 and -1/L for every other shift: that of white noise but for the mean.
+//! goes through all 2^n - 1 states but zero before it comes back (Golomb, Shift Register Sequences, 1967; Söderström
+//! and Stoica, System Identification, 1989, section 5.3). With s(t) = 1 - 2 a(t) the sum over a period of L = 2^n - 1
+//! is -1, and the autocorrelation (1/L) sum_t s(t) s(t + k) is 1 for k = 0 and -1/L for every other shift: that of
+//! white noise but for the mean.
 
 use thetahat_numerics::random::mixed;
 
 /// The shortest and the longest register.
 pub(super) const ORDERS: [u32; 2] = [2, 16];
 
-/// The powers below n of a primitive polynomial of each order, without 0 (Peterson and Weldon, Error-Correcting Codes, 2nd ed.
-/// 1972, appendix C).
+/// The powers below n of a primitive polynomial of each order, without 0 (Peterson and Weldon, Error-Correcting Codes,
+/// 2nd ed. 1972, appendix C).
 const POWERS: [&[u32]; 15] = [
     &[1],
     &[1],
@@ -50,8 +51,8 @@ pub(super) fn order_of(values: usize) -> Option<u32> {
     (ORDERS[0]..=ORDERS[1]).find(|&order| length(order) == values)
 }
 
-/// One period of values 1 and -1 of a register of `order` bits, which begins where the seed says. Empty for an order that there is
-/// no register of.
+/// One period of values 1 and -1 of a register of `order` bits, which begins where the seed says. Empty for an order
+/// that there is no register of.
 pub(super) fn sequence(order: u32, seed: u64) -> Vec<f64> {
     let Some(powers) = order.checked_sub(ORDERS[0]).and_then(|index| POWERS.get(index as usize)) else {
         return Vec::new();

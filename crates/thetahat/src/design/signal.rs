@@ -32,19 +32,19 @@ pub struct SignalPlan {
     pub waveform: Waveform,
     /// The lowest and the highest value, in units of the input.
     pub range: [f64; 2],
-    /// The root mean square of the deviations from the middle of `range`, instead of the width of that: a power budget. The signal
-    /// then leaves the range, or stays inside, as its crest factor says.
+    /// The root mean square of the deviations from the middle of `range`, instead of the width of that: a power budget.
+    /// The signal then leaves the range, or stays inside, as its crest factor says.
     pub rms: Option<f64>,
-    /// The lowest and the highest frequency, in radians per second: of multisines, chirps and stepped sines. None: all that the
-    /// period has, and of stepped sines those up to half the highest.
+    /// The lowest and the highest frequency, in radians per second: of multisines, chirps and stepped sines. None: all
+    /// that the period has, and of stepped sines those up to half the highest.
     pub band: Option<[f64; 2]>,
-    /// How many frequencies there are, each the same factor above the one before: of multisines, where None is all lines of the
-    /// period that lie in the band, and of stepped sines, where it is 10, or as many as there is room for.
+    /// How many frequencies there are, each the same factor above the one before: of multisines, where None is all
+    /// lines of the period that lie in the band, and of stepped sines, where it is 10, or as many as there is room for.
     pub points: Option<usize>,
     /// How many samples.
     pub length: usize,
-    /// After so many samples the signal repeats itself. None: of a PRBS the longest that fits into the length; of a multisine 4096
-    /// at most; else the whole length, and no repetition of what is random.
+    /// After so many samples the signal repeats itself. None: of a PRBS the longest that fits into the length; of a
+    /// multisine 4096 at most; else the whole length, and no repetition of what is random.
     pub period: Option<usize>,
     /// How many signals without correlation over a period.
     pub channels: usize,
@@ -91,17 +91,19 @@ pub struct TestSignal {
 impl TestSignal {
     /// Makes the signal of a plan.
     ///
-    /// - `prbs`: [maximum length](SignalKind::Prbs), registers of order 2 to 16; channels are shifts of one sequence by the same
-    ///   fraction of its period, so that their correlation is -1/L at every lag below that.
+    /// - `prbs`: [maximum length](SignalKind::Prbs), registers of order 2 to 16; channels are shifts of one sequence by
+    ///   the same fraction of its period, so that their correlation is -1/L at every lag below that.
     /// - `rbs`, `white`: independent values, drawn anew after the clock period; channels are independent.
-    /// - `multisine`: sinusoids of one amplitude on lines of the period, without the lines at 0 and at half the sampling
-    ///   frequency, with phases that make the peak low (Van der Ouderaa, Schoukens and Renneboog 1988); channels have every
-    ///   m-th line each, so that they are not correlated at any lag.
-    /// - `chirp`: sin of a phase whose slope rises from the lower to the upper end of the band within a period; channels are shifts.
-    /// - `sines`: each frequency for the same time, with a period rounded to whole samples; one channel after the other, the
-    ///   others in the middle of the range.
-    /// - `steps`: up and down with the dwell of the first channel, twice that of the second, and so on (Rademacher functions):
-    ///   channels are orthogonal over a period. Without a dwell there is one step for one channel, in the middle of the length.
+    /// - `multisine`: sinusoids of one amplitude on lines of the period, without the lines at 0 and at half the
+    ///   sampling frequency, with phases that make the peak low (Van der Ouderaa, Schoukens and Renneboog 1988);
+    ///   channels have every m-th line each, so that they are not correlated at any lag.
+    /// - `chirp`: sin of a phase whose slope rises from the lower to the upper end of the band within a period;
+    ///   channels are shifts.
+    /// - `sines`: each frequency for the same time, with a period rounded to whole samples; one channel after the
+    ///   other, the others in the middle of the range.
+    /// - `steps`: up and down with the dwell of the first channel, twice that of the second, and so on (Rademacher
+    ///   functions): channels are orthogonal over a period. Without a dwell there is one step for one channel, in the
+    ///   middle of the length.
     ///
     /// Cost: O(N) for N samples; of a multisine O(P log P) for a period of P samples, up to 20000 times.
     ///
@@ -188,8 +190,8 @@ impl TestSignal {
         self.hold
     }
 
-    /// The frequencies of its sinusoids in radians per second: those of a multisine, rising, or of stepped sines, one after the
-    /// other. Empty for other kinds.
+    /// The frequencies of its sinusoids in radians per second: those of a multisine, rising, or of stepped sines, one
+    /// after the other. Empty for other kinds.
     pub fn frequencies(&self) -> &[f64] {
         &self.frequencies
     }
@@ -468,8 +470,8 @@ fn cycles(plan: &SignalPlan, period: usize, points: usize) -> Result<(usize, Vec
     Ok((block, cycles))
 }
 
-/// Stepped sines, and their frequencies: those of the first channel, which the others have too. Each has a period of whole samples, so
-/// that it repeats itself to the bit and an analysis finds the period.
+/// Stepped sines, and their frequencies: those of the first channel, which the others have too. Each has a period of
+/// whole samples, so that it repeats itself to the bit and an analysis finds the period.
 fn sines(plan: &SignalPlan) -> Result<Made, Error> {
     let period = plan.period.unwrap_or(plan.length);
     let (block, cycles) = match plan.points {

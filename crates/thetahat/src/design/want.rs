@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::Error;
 use crate::model::PolynomialModel;
 
-/// A figure of a model, and the standard error that it may have at most. Written `a1:0.01`, or `dc-gain:2%` for a fraction of the
-/// figure's value.
+/// A figure of a model, and the standard error that it may have at most. Written `a1:0.01`, or `dc-gain:2%` for a
+/// fraction of the figure's value.
 ///
 /// ```
 /// use thetahat::design::{Limit, Want};
@@ -23,8 +23,8 @@ use crate::model::PolynomialModel;
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Want {
-    /// The name of a parameter, such as `a1`; `dc-gain` or `time-constant`, with a number after it where there are several: of the
-    /// input, or of the pole.
+    /// The name of a parameter, such as `a1`; `dc-gain` or `time-constant`, with a number after it where there are
+    /// several: of the input, or of the pole.
     pub figure: String,
     /// Its standard error at most.
     pub limit: Limit,

@@ -76,7 +76,8 @@ impl SignalKind {
 pub struct Waveform {
     /// Which kind.
     pub kind: SignalKind,
-    /// The clock period in samples: of a PRBS, an RBS or white noise 1 if it is not given; of steps, the time from one to the next.
+    /// The clock period in samples: of a PRBS, an RBS or white noise 1 if it is not given; of steps, the time from one
+    /// to the next.
     pub hold: Option<usize>,
 }
 

@@ -63,22 +63,23 @@ pub struct SignalWorth {
     pub order: Vec<usize>,
     /// The standard error of each figure; none where the signal leaves it open.
     pub standard_errors: Vec<Option<f64>>,
-    /// The fewest samples, to half a percent, after which all errors are as small as is wanted; none where nothing is wanted, and where a
-    /// million are too few.
+    /// The fewest samples, to half a percent, after which all errors are as small as is wanted; none where nothing is
+    /// wanted, and where a million are too few.
     pub needed: Option<usize>,
 }
 
-/// Compares signals for a model: the standard errors that each would give, and how long it has to be for those that are wanted.
+/// Compares signals for a model: the standard errors that each would give, and how long it has to be for those that are
+/// wanted.
 ///
-/// The errors are those of [`planned`](super::planned()). The length is found by evaluating them: each sample adds information, so
-/// that a longer experiment, which begins with the shorter one, is never worse, and halving an interval finds the first that is
-/// good enough. Signals are compared in parallel.
+/// The errors are those of [`planned`](super::planned()). The length is found by evaluating them: each sample adds
+/// information, so that a longer experiment, which begins with the shorter one, is never worse, and halving an interval
+/// finds the first that is good enough. Signals are compared in parallel.
 ///
 /// Cost: about 20 evaluations of O(N p) for each signal.
 ///
 /// # Errors
-/// As for [`TestSignal::new`] and [`planned`](super::planned()), but that inputs which leave parameters open have no errors; and
-/// [`Error::Argument`] for a figure that the model does not have.
+/// As for [`TestSignal::new`] and [`planned`](super::planned()), but that inputs which leave parameters open have no
+/// errors; and [`Error::Argument`] for a figure that the model does not have.
 ///
 /// ```
 /// use thetahat::data::Record;

@@ -69,7 +69,8 @@ impl Row {
         self.0.iter().find(|(own, _)| own == name).map(|(_, cell)| cell)
     }
 
-    /// The names of all cells of some rows: each once, after the name that stands before it in the first row that has it.
+    /// The names of all cells of some rows: each once, after the name that stands before it in the first row that has
+    /// it.
     ///
     /// ```
     /// use thetahat::Row;

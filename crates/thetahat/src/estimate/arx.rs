@@ -123,7 +123,8 @@ pub fn arx_factor(
         .map_err(|error| Error::data(format!("the record cannot be factored: {error}")))
 }
 
-/// The sums of products of a regression in twice the precision, for normal equations that are solved without the record.
+/// The sums of products of a regression in twice the precision, for normal equations that are solved without the
+/// record.
 pub(crate) fn lagged_products(record: &Record<'_>, orders: &Orders) -> Result<ExtendedGram, Error> {
     linear(orders)?;
     let signals = signals(record, orders)?;
@@ -160,8 +161,8 @@ pub(crate) fn estimate_is_for_f() -> Error {
     )
 }
 
-/// The segments with as many of the measured samples before them as a regressor reaches back to: their first row with a full
-/// regressor is then the segment's own first, if so many are there.
+/// The segments with as many of the measured samples before them as a regressor reaches back to: their first row with a
+/// full regressor is then the segment's own first, if so many are there.
 ///
 /// Without A a row needs no past output, and a segment ends where an output is missing only to go on after it.
 pub(super) fn with_past<'r>(

@@ -1,9 +1,10 @@
 //! Steps that come to the border of stability.
 //!
-//! A step of Gauss and Newton often takes a root of C or F out of the unit circle: the data want a slower mode than there is,
-//! or an unstable one. In a shorter step, or a damped one, all parameters would wait for that root, and a search would
-//! crawl. So the root alone is moved back, to a fraction of the distance from the circle that there was before, and A and B,
-//! which are linear once C, D and F are given, are solved for (Golub and Pereyra, SIAM J. Numerical Analysis 10, 1973).
+//! A step of Gauss and Newton often takes a root of C or F out of the unit circle: the data want a slower mode than
+//! there is, or an unstable one. In a shorter step, or a damped one, all parameters would wait for that root, and a
+//! search would crawl. So the root alone is moved back, to a fraction of the distance from the circle that there was
+//! before, and A and B, which are linear once C, D and F are given, are solved for (Golub and Pereyra, SIAM J.
+//! Numerical Analysis 10, 1973).
 
 use thetahat_core::nalgebra::{Complex, ComplexField};
 
@@ -43,8 +44,9 @@ impl Border {
         }
     }
 
-    /// Moves the roots of C and F at `trial`, and of A if need be, that are outside the unit circle back into it, on a circle that
-    /// is nearer to it than the roots at `from`. Says whether that made all of them stable. O(n^2) for each sweep over n roots.
+    /// Moves the roots of C and F at `trial`, and of A if need be, that are outside the unit circle back into it, on a
+    /// circle that is nearer to it than the roots at `from`. Says whether that made all of them stable. O(n^2) for each
+    /// sweep over n roots.
     pub(super) fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
         let Self { stable_a, before, after, roots, product, scratch } = self;
         before.set(from);

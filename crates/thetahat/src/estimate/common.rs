@@ -21,7 +21,8 @@ const LARGEST_PRICE: f64 = 100.0;
 
 /// Where in a segment errors begin, and where they count: the same for all models.
 ///
-/// In the first samples, as many as the longest model reaches back, e = 0; what 1/C makes of that fades before errors count.
+/// In the first samples, as many as the longest model reaches back, e = 0; what 1/C makes of that fades before errors
+/// count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Window {
     /// How many samples the models reach back.
@@ -80,8 +81,8 @@ impl<'a> Common<'a> {
         Predictor::counting(self.record, orders, self.begin, self.window.left_out, self.window.counted)
     }
 
-    /// The least sum of squared errors that searches find: one from the best of `starts`, and with `recipes` one from the best
-    /// of the starts that the data give. None where the data do not determine the parameters.
+    /// The least sum of squared errors that searches find: one from the best of `starts`, and with `recipes` one from
+    /// the best of the starts that the data give. None where the data do not determine the parameters.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
@@ -125,9 +126,9 @@ impl<'a> Common<'a> {
         Ok(Some(Point { parameters, cost, initial: self.price(&predictor, cost) }))
     }
 
-    /// The price of n initial conditions w: what is known of them before is that they have the size of the output. So their
-    /// part in -2 ln(likelihood), integrated over them (Schwarz 1978, Annals of Statistics 6, without his limit of many
-    /// samples: what fades is not seen better the longer it lasts), is
+    /// The price of n initial conditions w: what is known of them before is that they have the size of the output. So
+    /// their part in -2 ln(likelihood), integrated over them (Schwarz 1978, Annals of Statistics 6, without his limit
+    /// of many samples: what fades is not seen better the longer it lasts), is
     ///
     /// ```text
     /// ln det(I + (mean y^2/sigma^2) sum h h'),  h = de/dw;
@@ -146,8 +147,8 @@ impl<'a> Common<'a> {
         predictor.free_information(size / variance).max(least).min(LARGEST_PRICE * count as f64)
     }
 
-    /// The mean of e^2 of given parameters on samples that they were not fitted to. Initial conditions are, and take as many
-    /// samples with them. None where C or F is unstable, the errors overflow, or too few samples count.
+    /// The mean of e^2 of given parameters on samples that they were not fitted to. Initial conditions are, and take as
+    /// many samples with them. None where C or F is unstable, the errors overflow, or too few samples count.
     pub(crate) fn mean(&self, orders: &Orders, parameters: &[f64]) -> Option<f64> {
         let mut predictor = self.predictor(orders);
         let left =

@@ -10,8 +10,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::Error;
 
-/// A criterion: the word for it, its name, what it is, whether it is the logarithm of the cost and a penalty, and its value for
-/// J, p and N.
+/// A criterion: the word for it, its name, what it is, whether it is the logarithm of the cost and a penalty, and its
+/// value for J, p and N.
 struct Entry {
     word: &'static str,
     name: &'static str,
@@ -78,7 +78,8 @@ fn logarithm(cost: f64) -> Option<f64> {
 /// HQC  = 2 p ln(ln N)/N + ln J                Hannan and Quinn 1979, J. Royal Statistical Society B 41
 /// ```
 ///
-/// FPE has the units of y squared. A value is none where it is not defined: the logarithms at J = 0, AICc at N <= p + 1.
+/// FPE has the units of y squared. A value is none where it is not defined: the logarithms at J = 0, AICc at N <= p
+/// + 1.
 ///
 /// ```
 /// use thetahat::estimate::InformationCriterion;
@@ -128,8 +129,8 @@ impl InformationCriterion {
         self.entry().logarithmic
     }
 
-    /// That of a model with `parameters` parameters and mean square error `mse` over `samples` samples, which must be more than
-    /// the parameters for FPE to be positive.
+    /// That of a model with `parameters` parameters and mean square error `mse` over `samples` samples, which must be
+    /// more than the parameters for FPE to be positive.
     pub fn value(self, mse: f64, parameters: usize, samples: usize) -> Option<f64> {
         (self.entry().value)(mse, parameters as f64, samples as f64)
     }

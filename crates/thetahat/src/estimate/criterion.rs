@@ -50,7 +50,8 @@ pub struct Bound {
     pub high: f64,
 }
 
-/// A range for the static gain B_j(1)/A(1) from an input to the output, in units of y over units of u. Equal ends set it.
+/// A range for the static gain B_j(1)/A(1) from an input to the output, in units of y over units of u. Equal ends set
+/// it.
 ///
 /// ```
 /// use thetahat::estimate::GainBound;
@@ -81,19 +82,19 @@ pub struct GainBound {
 /// norm inf:  N max |e| + k sum (r_i theta_i)^2 / r_y
 /// ```
 ///
-/// under low <= theta_i <= high for each [`Bound`], low A(1) <= B_j(1) <= high A(1) and A(1) >= 0 for each [`GainBound`]
-/// (only B_j(1) = G A(1) where the ends are equal), and |e(t)| <= E for all t with a noise bound E. A(1) is positive for
-/// every stable model, so that the gain is then in its range; at A(1) = 0 there is none, and the range is reported as
-/// active.
+/// under low <= theta_i <= high for each [`Bound`], low A(1) <= B_j(1) <= high A(1) and A(1) >= 0 for each
+/// [`GainBound`] (only B_j(1) = G A(1) where the ends are equal), and |e(t)| <= E for all t with a noise bound E. A(1)
+/// is positive for every stable model, so that the gain is then in its range; at A(1) = 0 there is none, and the range
+/// is reported as active.
 ///
-/// The ridge k counts samples: r_i is the RMS of the regressor of theta_i and r_y that of y, so that k has no unit, does
-/// not depend on the units of the channels, and k = 1 weighs as one more sample for each parameter, in which its
+/// The ridge k counts samples: r_i is the RMS of the regressor of theta_i and r_y that of y, so that k has no unit,
+/// does not depend on the units of the channels, and k = 1 weighs as one more sample for each parameter, in which its
 /// regressor stands alone at its RMS and y is 0. k has to be compared with N.
 ///
-/// For linear models all these are convex: there is one smallest value, and it is found. Norm 1 does not follow single wild samples
-/// (Bloomfield and Steiger, Least Absolute Deviations, 1983); norm inf, and the set of all theta with |e(t)| <= E, suit
-/// errors of known bound, such as those of a coarse converter (Milanese and Belforte, IEEE Transactions on Automatic
-/// Control 27 (1982), who also bound the set by a box).
+/// For linear models all these are convex: there is one smallest value, and it is found. Norm 1 does not follow single
+/// wild samples (Bloomfield and Steiger, Least Absolute Deviations, 1983); norm inf, and the set of all theta
+/// with |e(t)| <= E, suit errors of known bound, such as those of a coarse converter (Milanese and Belforte, IEEE
+/// Transactions on Automatic Control 27 (1982), who also bound the set by a box).
 ///
 /// ```
 /// use thetahat::estimate::{ConvexFit, Norm};
@@ -265,26 +266,26 @@ fn check_range(argument: &str, words: &str, low: f64, high: f64) -> Result<(), E
     Err(Error::argument(argument, format!("{words}: {wrong}")))
 }
 
-/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`ConvexFit`]. `inputs` are the names of the channels; nothing is
-/// asked of the last inputs if they have none.
+/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + e(t) under a [`ConvexFit`]. `inputs` are the names of the channels;
+/// nothing is asked of the last inputs if they have none.
 ///
 /// The covariance is, with sigma^2 = sum e^2 / (N - q) and q the number of parameters that the data determine
 /// (p less the active demands; with a ridge the trace of M G):
 ///
-/// - norm 2: sigma^2 M G M, G = Phi'Phi, M the inverse of G and the ridge in the directions along which the active demands
-///   do not change, taken as known equations. Without a ridge and active demands this is sigma^2 (Phi'Phi)^-1.
-/// - norm 1 without a ridge and active demands: s^2/4 (Phi'Phi)^-1 with the sparsity s = 1/f(0), f being the density of e
-///   (Koenker and Bassett, Regression quantiles, Econometrica 46 (1978), section 4). s is the difference quotient of the
-///   residuals' quantiles at 1/2 - h and 1/2 + h, h after Hall and Sheather, Journal of the Royal Statistical Society B 50
-///   (1988), for 95 % intervals.
+/// - norm 2: sigma^2 M G M, G = Phi'Phi, M the inverse of G and the ridge in the directions along which the active
+///   demands do not change, taken as known equations. Without a ridge and active demands this is sigma^2 (Phi'Phi)^-1.
+/// - norm 1 without a ridge and active demands: s^2/4 (Phi'Phi)^-1 with the sparsity s = 1/f(0), f being the density of
+///   e (Koenker and Bassett, Regression quantiles, Econometrica 46 (1978), section 4). s is the difference quotient of
+///   the residuals' quantiles at 1/2 - h and 1/2 + h, h after Hall and Sheather, Journal of the Royal Statistical
+///   Society B 50 (1988), for 95 % intervals.
 /// - else there is none: with norm inf and noise bounds the error is not near normal.
 ///
 /// Parameters are exact to rounding where the active rows can be told; bounds hold to the last bit, gains to rounding.
 /// The same input gives the same bits, whatever the number of threads.
 ///
-/// Cost: norm 2 O(N p) where least squares respects the demands, else 2 N p^2 flops and a program in p variables. Norm 1
-/// programs of some (N p)^(2/3) samples, norm inf and noise bounds of some 10 p samples, and O(N p) to find these; the box
-/// 2 p programs.
+/// Cost: norm 2 O(N p) where least squares respects the demands, else 2 N p^2 flops and a program in p variables. Norm
+/// 1 programs of some (N p)^(2/3) samples, norm inf and noise bounds of some 10 p samples, and O(N p) to find these;
+/// the box 2 p programs.
 ///
 /// # Errors
 /// As for [`arx`](crate::estimate::arx); [`Error::Argument`] if an option makes no sense, or names what is not there;

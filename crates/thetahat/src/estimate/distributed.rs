@@ -1,10 +1,11 @@
 //! Prediction errors of experiments that others hold, in other processes or on other machines.
 //!
-//! A search asks of the data, at each point, J = sum e^2, half its gradient, and the Gram matrix of psi = -de/dtheta: sums over
-//! all samples, and so sums of what each holder of experiments finds in its own. The weights of the initial-condition responses of
-//! an experiment are its own affair but for the steps that the search takes: where they stand goes out with the parameters, and how
-//! they follow a step comes back with the sums. So a holder keeps nothing from one question to the next: who is lost is replaced,
-//! and the same questions have the same answers. p^2 + n (p + 1) numbers for p parameters and n initial conditions go back.
+//! A search asks of the data, at each point, J = sum e^2, half its gradient, and the Gram matrix of psi = -de/dtheta:
+//! sums over all samples, and so sums of what each holder of experiments finds in its own. The weights of the
+//! initial-condition responses of an experiment are its own affair but for the steps that the search takes: where they
+//! stand goes out with the parameters, and how they follow a step comes back with the sums. So a holder keeps nothing
+//! from one question to the next: who is lost is replaced, and the same questions have the same answers. p^2 + n (p
+//! + 1) numbers for p parameters and n initial conditions go back.
 //!
 //! An answer has the normal equations at once, as nearly all points that a search tries are taken.
 
@@ -49,7 +50,8 @@ impl<'a> Holders<'a> {
         Self { ask, count, failed: RefCell::new(None), latest: RefCell::default() }
     }
 
-    /// What made an answer fail, if one did: nothing that was found since then is of any worth. Whoever takes it gives it on.
+    /// What made an answer fail, if one did: nothing that was found since then is of any worth. Whoever takes it gives
+    /// it on.
     pub(crate) fn failure(&self) -> Option<Error> {
         self.failed.take()
     }
@@ -119,7 +121,8 @@ impl<'a> Holders<'a> {
         Ok((squares - sum * sum / count).max(0.0).sqrt())
     }
 
-    /// Some rows of each holder, one channel after the other, the output last; and the energy of the output in all rows.
+    /// Some rows of each holder, one channel after the other, the output last; and the energy of the output in all
+    /// rows.
     ///
     /// # Errors
     /// What made an answer fail.

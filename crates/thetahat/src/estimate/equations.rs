@@ -31,15 +31,15 @@ pub(crate) use uncertainty::listed;
 pub struct EquationsOutcome {
     /// The sum over all measured values of -1/2 (ln 2 pi S + e^2/S).
     pub log_likelihood: f64,
-    /// How surprising the rows were, counted by row: the mean is above what is expected if the noises of the log are larger
-    /// than those of the model. None where nothing was measured.
+    /// How surprising the rows were, counted by row: the mean is above what is expected if the noises of the log are
+    /// larger than those of the model. None where nothing was measured.
     pub nis: Option<NisSummary>,
     /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected).
     pub covariance_factor: f64,
     /// What was known of the parameters before the fit, in their order.
     pub unknown: Vec<UnknownParameter>,
-    /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each run; none where
-    /// it grows out of range.
+    /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each
+    /// run; none where it grows out of range.
     pub starts: Vec<Vec<Option<f64>>>,
     /// How the search went.
     pub search: LikelihoodSearch,
@@ -58,10 +58,11 @@ pub struct UnknownParameter {
     /// The upper bound, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
-    /// How it is kept within its bounds, such as `mass = 0.1 + exp(z)`, z being the variable that the search moved; none for
-    /// one without.
+    /// How it is kept within its bounds, such as `mass = 0.1 + exp(z)`, z being the variable that the search moved;
+    /// none for one without.
     pub change_of_variable: Option<String>,
-    /// The standard error of the estimate if the noises of the model are those of the log: not multiplied by the covariance factor.
+    /// The standard error of the estimate if the noises of the model are those of the log: not multiplied by the
+    /// covariance factor.
     pub nominal_standard_error: f64,
 }
 
@@ -78,8 +79,8 @@ pub struct LikelihoodSearch {
     pub max_iterations: usize,
     /// Iterations done, from the start that won.
     pub iterations: usize,
-    /// It stops when a step would raise the log-likelihood by no more than this fraction of half the measured values, or of half the
-    /// sum of e^2/S where that is larger.
+    /// It stops when a step would raise the log-likelihood by no more than this fraction of half the measured values,
+    /// or of half the sum of e^2/S where that is larger.
     pub tolerance: f64,
     /// Why it stopped.
     pub stopped: Stopped,
@@ -88,8 +89,8 @@ pub struct LikelihoodSearch {
     /// The seed of random starts, if there were any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// The log-likelihood that each start led to, that of the model first; none where the filter does not work at the start. Empty if
-    /// there was but one.
+    /// The log-likelihood that each start led to, that of the model first; none where the filter does not work at the
+    /// start. Empty if there was but one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reached: Vec<Option<f64>>,
 }
@@ -113,9 +114,9 @@ pub(crate) struct EquationsEstimate {
 
 /// The unknown parameters of the largest likelihood on some experiments.
 ///
-/// The search starts where the model says, and from `starts` further points: there the variables are drawn from what the model knows of
-/// them, N(z, sd). What reaches the largest likelihood wins, the first of them where several do. All of them are searched side by side;
-/// the result does not depend on how many threads there are.
+/// The search starts where the model says, and from `starts` further points: there the variables are drawn from what
+/// the model knows of them, N(z, sd). What reaches the largest likelihood wins, the first of them where several do. All
+/// of them are searched side by side; the result does not depend on how many threads there are.
 ///
 /// # Errors
 /// As for [`fit_equations`](crate::report::fit_equations).

@@ -4,25 +4,27 @@
 //! y = x + z,   A x = sum_j B_j u_j,   A z = C e,   e Gaussian and white
 //! ```
 //!
-//! z is stationary, and no sample of it is known or left out: its likelihood is that of the Kalman filter that begins with the
-//! stationary covariance and goes on through missing values (`kalman`; Harvey, Forecasting, Structural Time Series Models and the
-//! Kalman Filter, 1989, sections 3.3 and 3.4). With innovations v of variance f var e over the N outputs that were measured, and
-//! var e at its best, S/N with S = sum v^2/f,
+//! z is stationary, and no sample of it is known or left out: its likelihood is that of the Kalman filter that begins
+//! with the stationary covariance and goes on through missing values (`kalman`; Harvey, Forecasting, Structural Time
+//! Series Models and the Kalman Filter, 1989, sections 3.3 and 3.4). With innovations v of variance f var e over the N
+//! outputs that were measured, and var e at its best, S/N with S = sum v^2/f,
 //!
 //! ```text
 //! -2 ln L = N (ln 2 pi + 1) + N ln(S/N) + sum ln f
 //! ```
 //!
-//! What is minimised is S exp(sum ln f/N), which is S where f = 1: by Fisher scoring with exact derivatives (`likelihood`), in the
-//! search of all other estimates, from the least sum of squared errors, without missing outputs or with lines drawn through them.
+//! What is minimised is S exp(sum ln f/N), which is S where f = 1: by Fisher scoring with exact derivatives
+//! (`likelihood`), in the search of all other estimates, from the least sum of squared errors, without missing outputs
+//! or with lines drawn through them.
 //!
-//! x is no process: inputs are known. With `Initial::Zero` it begins at rest with the segment. With `Initial::Estimate` the impulses
-//! into 1/A that stand for its past are estimated: na of them where the nb + nk - 1 inputs before the segment were measured,
-//! max(na, nb + nk - 1) where none was. Auto estimates them where rows stand before a segment, or where they are worth it,
-//! N ln(cost_zero/cost_estimate) > n ln N. A constant and a trend have always been there: x is their line.
+//! x is no process: inputs are known. With `Initial::Zero` it begins at rest with the segment. With `Initial::Estimate`
+//! the impulses into 1/A that stand for its past are estimated: na of them where the nb + nk - 1 inputs before the
+//! segment were measured, max(na, nb + nk - 1) where none was. Auto estimates them where rows stand before a segment,
+//! or where they are worth it, N ln(cost_zero/cost_estimate) > n ln N. A constant and a trend have always been there: x
+//! is their line.
 //!
-//! A process with a root of A on the unit circle has no stationary covariance, and the likelihood goes to zero there: A stays
-//! stable, and an integrator comes out as a slow pole.
+//! A process with a root of A on the unit circle has no stationary covariance, and the likelihood goes to zero there: A
+//! stays stable, and an integrator comes out as a slow pole.
 //!
 //! The covariance of the parameters is the inverse of their information, with var e = S/(N - p - n).
 
@@ -74,8 +76,8 @@ impl LikelihoodOutcome {
     }
 }
 
-/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + C(q) e(t) by its exact likelihood. The last inputs, `lines` of them, are those of a
-/// constant and a trend.
+/// Fits A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + C(q) e(t) by its exact likelihood. The last inputs, `lines` of them,
+/// are those of a constant and a trend.
 pub(super) fn exact(
     record: &Record<'_>,
     lines: usize,
@@ -121,8 +123,8 @@ pub(super) fn exact(
     job.finish(reached)
 }
 
-/// As [`beside`](super::prediction_error::beside) of an estimate of least squared errors: `lines` of the inputs are a constant and a
-/// trend.
+/// As [`beside`](super::prediction_error::beside) of an estimate of least squared errors: `lines` of the inputs are a
+/// constant and a trend.
 pub(super) fn beside(
     record: &Record<'_>,
     lines: usize,
@@ -209,8 +211,8 @@ struct Reached<'r> {
 }
 
 impl<'r> Job<'_, 'r> {
-    /// Parameters to start from, by name: those of least squared errors over what follows on itself without a missing output,
-    /// and with lines drawn through missing ones.
+    /// Parameters to start from, by name: those of least squared errors over what follows on itself without a missing
+    /// output, and with lines drawn through missing ones.
     fn starts(&self) -> Result<Vec<(&'static str, Vec<f64>)>, Error> {
         let record = self.record;
         let runs: Vec<_> =

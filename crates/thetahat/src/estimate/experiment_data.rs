@@ -1,4 +1,5 @@
-//! Where the data of a fit by prediction errors are: at hand, as a record, or with others who are asked for sums over them.
+//! Where the data of a fit by prediction errors are: at hand, as a record, or with others who are asked for sums over
+//! them.
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{DMatrix, Dyn};
@@ -62,8 +63,8 @@ pub(crate) trait PredictionErrors: Objective<Refusal = Unusable> {
     /// By how much a column of psi is at most larger than what the initial-condition responses leave of it.
     fn cancellation(&self) -> f64;
 
-    /// The triangular factor of psi without the initial-condition responses, as exact as Householder QR. None where an entry is too
-    /// large for squares.
+    /// The triangular factor of psi without the initial-condition responses, as exact as Householder QR. None where an
+    /// entry is too large for squares.
     fn factor(&self) -> Option<LeastSquares<f64, Dyn>>;
 
     /// The autoregression of the errors that count; `taken` degrees of freedom were used by what left them.
@@ -72,8 +73,8 @@ pub(crate) trait PredictionErrors: Objective<Refusal = Unusable> {
     /// The autoregression of the errors of which the fit has left these. For models of output error.
     fn restricted_autoregression(&self, taken: usize) -> Option<Autoregression>;
 
-    /// sum zeta zeta' over all samples, zeta being `weights` psi without the initial-condition responses, filtered backwards in time
-    /// by 1/A(q^+1), A = `monic`. For models of output error.
+    /// sum zeta zeta' over all samples, zeta being `weights` psi without the initial-condition responses, filtered
+    /// backwards in time by 1/A(q^+1), A = `monic`. For models of output error.
     fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> Option<DMatrix<f64>>;
 }
 

@@ -1,7 +1,7 @@
 //! Impulse responses by regularised least squares.
 //!
-//! y = Phi g + e, y(t) = sum_j sum_i g_ji u_j(t - nk_j - i) + e(t): least squares alone makes the g of many taps as noisy as the data. A
-//! prior of smooth, decaying responses, g_j ~ N(0, sigma^2 P_j), with the kernels
+//! y = Phi g + e, y(t) = sum_j sum_i g_ji u_j(t - nk_j - i) + e(t): least squares alone makes the g of many taps as
+//! noisy as the data. A prior of smooth, decaying responses, g_j ~ N(0, sigma^2 P_j), with the kernels
 //!
 //! ```text
 //! DC (diagonal and correlated):  P_ik = c lambda^((i+k)/2) rho^|i-k|,     TC (tuned and correlated):  rho = sqrt(lambda)
@@ -19,15 +19,15 @@
 //! -2 ln L = N ln(rss/N) + ln det(I + P G),   rss = y'y - d' g
 //! ```
 //!
-//! With D = diag(sqrt(c) lambda^(i/2)) and the correlations K_ik = rho^|i-k|, P = D K D. K is that of an autoregression of order 1, so that
-//! its inverse T is tridiagonal and det K = (1 - rho^2)^(n-1); then
+//! With D = diag(sqrt(c) lambda^(i/2)) and the correlations K_ik = rho^|i-k|, P = D K D. K is that of an autoregression
+//! of order 1, so that its inverse T is tridiagonal and det K = (1 - rho^2)^(n-1); then
 //!
 //! ```text
 //! ln det(I + P G) = (n - 1) ln(1 - rho^2) + ln det(T + D G D),   g = D h,   h = (T + D G D)^-1 D d
 //! ```
 //!
-//! is computed from numbers of one size, whatever the decay (Chen and Ljung, Automatica 49, 2013). With S = (T + D G D)^-1 and
-//! W_ik = S_ik + (N/rss) h_i h_k the slopes are sums over the tridiagonal:
+//! is computed from numbers of one size, whatever the decay (Chen and Ljung, Automatica 49, 2013). With S = (T + D G
+//! D)^-1 and W_ik = S_ik + (N/rss) h_i h_k the slopes are sums over the tridiagonal:
 //!
 //! ```text
 //! d/d ln c      = n - sum T_ik W_ik,
@@ -35,7 +35,8 @@
 //! d/d rho       = sum dT_ik/drho W_ik - 2 (n - 1) rho/(1 - rho^2)
 //! ```
 //!
-//! G comes from lagged products (see `regression`), so that N samples are read once; an evaluation is one Cholesky factor and its inverse.
+//! G comes from lagged products (see `regression`), so that N samples are read once; an evaluation is one Cholesky
+//! factor and its inverse.
 
 #[cfg(test)]
 mod tests;

@@ -261,8 +261,8 @@ fn simulated(
 /// theta <- theta + (sum z phi')^-1 sum z e,   phi = [u_F(t - nk - i)  -y_F(t - i)],   z = [u_F(t - nk - i)  -x_F(t - i)]
 /// ```
 ///
-/// with F of the last theta in the filters, until a step is below 1e-5 standard errors; a step that does not lower sum e^2 is
-/// halved. At the end sum z e = 0, which is the condition for the least output error. The covariance is that for
+/// with F of the last theta in the filters, until a step is below 1e-5 standard errors; a step that does not lower sum
+/// e^2 is halved. At the end sum z e = 0, which is the condition for the least output error. The covariance is that for
 /// coloured errors, initial conditions taken out (see `uncertainty`).
 ///
 /// Source: Young, Some observations on instrumental variable methods of time-series analysis, Int. J. Control 23, 1976;

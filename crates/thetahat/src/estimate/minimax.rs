@@ -4,28 +4,29 @@
 //! V(x) = max |e(t, x)|   or   sum |e(t, x)|,   x = (theta, initial conditions)
 //! ```
 //!
-//! Around x the errors are e - psi's for a step s, and V of these is least, among short steps, at the optimum of a linear
-//! program (Madsen, An algorithm for minimax solution of overdetermined systems of non-linear equations, Journal of the
-//! Institute of Mathematics and its Applications 16 (1975); Osborne and Watson, An algorithm for minimax approximation in
-//! the nonlinear case, Computer Journal 12 (1969); for sums, On an algorithm for discrete nonlinear L1 approximation,
-//! Computer Journal 14 (1971)):
+//! Around x the errors are e - psi's for a step s, and V of these is least, among short steps, at the optimum of a
+//! linear program (Madsen, An algorithm for minimax solution of overdetermined systems of non-linear equations, Journal
+//! of the Institute of Mathematics and its Applications 16 (1975); Osborne and Watson, An algorithm for minimax
+//! approximation in the nonlinear case, Computer Journal 12 (1969); for sums, On an algorithm for discrete nonlinear L1
+//! approximation, Computer Journal 14 (1971)):
 //!
 //! ```text
 //! m(D) = V(x) - min V(e - psi's)   over s = S w, |w_i| <= D,   S = rms(e) sqrt(N) R^-1,   psi = Q R
 //! ```
 //!
-//! A step that leads less low than promised is corrected: the errors there take the place of the linearised ones, and the
-//! program is solved again (Fletcher, Second order corrections for non-differentiable optimization, Lecture Notes in
-//! Mathematics 912, 1982). A step is taken if V falls by a part of m(D); D is halved where it falls by much less, and doubled where it falls as
-//! promised and D was in the way. m is concave in D, so that m(D)/min(D, 1) bounds what any step of up to D = 1 promises:
-//! where it is below the tolerance times V, no small step lowers V to first order, and the search has converged. With as
-//! many errors of the largest size as there are unknowns, and one more, it does so quadratically, as Newton's method.
+//! A step that leads less low than promised is corrected: the errors there take the place of the linearised ones, and
+//! the program is solved again (Fletcher, Second order corrections for non-differentiable optimization, Lecture Notes
+//! in Mathematics 912, 1982). A step is taken if V falls by a part of m(D); D is halved where it falls by much less,
+//! and doubled where it falls as promised and D was in the way. m is concave in D, so that m(D)/min(D, 1) bounds what
+//! any step of up to D = 1 promises: where it is below the tolerance times V, no small step lowers V to first order,
+//! and the search has converged. With as many errors of the largest size as there are unknowns, and one more, it does
+//! so quadratically, as Newton's method.
 //!
-//! C and each F are searched for in the coordinates of [`reflection`](super::reflection), in which stability has no border.
-//! They move by up to two, or two D if that is less.
+//! C and each F are searched for in the coordinates of [`reflection`](super::reflection), in which stability has no
+//! border. They move by up to two, or two D if that is less.
 //!
-//! It starts from the least squares estimate. Memory: psi, N numbers for each unknown. Cost of an iteration: O(N p^2), and
-//! programs of some 10 p rows, or of some (N p)^(2/3) for the sum.
+//! It starts from the least squares estimate. Memory: psi, N numbers for each unknown. Cost of an iteration: O(N p^2),
+//! and programs of some 10 p rows, or of some (N p)^(2/3) for the sum.
 
 use thetahat_core::nalgebra::DVector;
 use thetahat_numerics::optimize::{Deadline, Monitor, Objective, Progress, Search, Stopped, best_free};
@@ -52,8 +53,8 @@ const POOR: f64 = 0.25;
 const GOOD: f64 = 0.75;
 /// Below this D no step is long enough to change V by more than rounding.
 const SHORTEST: f64 = 1e-10;
-/// The same for a sum, whose programs take longer and begin where a search has ended; and it has converged where a step is
-/// to lower it, or has lowered it, by less than this part, far below what its own uncertainty is.
+/// The same for a sum, whose programs take longer and begin where a search has ended; and it has converged where a step
+/// is to lower it, or has lowered it, by less than this part, far below what its own uncertainty is.
 const SHORTEST_OF_SUMS: f64 = 1e-4;
 const ENOUGH_OF_SUMS: f64 = 1e-5;
 /// How far a coordinate of C or F moves in a step for D = 1, and how far it goes at all.
@@ -293,7 +294,8 @@ impl Point {
         (!slopes.columns.is_empty()).then_some(slopes)
     }
 
-    /// The point after a step of the coordinates and the weights; none where errors overflow, or a polynomial is not stable.
+    /// The point after a step of the coordinates and the weights; none where errors overflow, or a polynomial is not
+    /// stable.
     fn moved(&self, predictor: &mut Predictor<'_>, step: &Step) -> Option<Self> {
         let size = self.parameters.len();
         let next = self.coordinates.iter().chain(&self.weights).zip(&step.moves).map(|(at, step)| at + step);

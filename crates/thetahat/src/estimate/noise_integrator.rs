@@ -4,9 +4,9 @@
 //! A y = B/F u + C/((1 - q^-1) D') e   <=>   A (1 - q^-1) y = B/F (1 - q^-1) u + C/D' e
 //! ```
 //!
-//! The plant is estimated from changes, and the noise is a random walk with a level of its own everywhere: an ARIMAX model (Ljung, System
-//! Identification, 2nd ed. 1999, section 4.2; Box, Jenkins and Reinsel, Time Series Analysis, 1994, chapter 4). The level of the output is no
-//! parameter of it.
+//! The plant is estimated from changes, and the noise is a random walk with a level of its own everywhere: an ARIMAX
+//! model (Ljung, System Identification, 2nd ed. 1999, section 4.2; Box, Jenkins and Reinsel, Time Series Analysis,
+//! 1994, chapter 4). The level of the output is no parameter of it.
 
 use thetahat_numerics::optimize::{Monitor, Search};
 

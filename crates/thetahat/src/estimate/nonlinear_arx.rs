@@ -117,7 +117,8 @@ pub(crate) struct Solved {
 }
 
 impl<'l> Samples<'l> {
-    /// The samples in `segments`, each with the number of measured ones before it; `log` has deviations, and `head` one output.
+    /// The samples in `segments`, each with the number of measured ones before it; `log` has deviations, and `head` one
+    /// output.
     pub(crate) fn new(
         log: &'l Log,
         mut head: NonlinearArxModel,
@@ -308,12 +309,12 @@ impl<'l> Samples<'l> {
         self.model(map, theta.into_iter().map(named).collect())
     }
 
-    /// Chooses functions, `most` at most. Where `chosen_on` has other samples, such as the first part of a split, held-out rows are
-    /// asked of models that were fitted to those.
+    /// Chooses functions, `most` at most. Where `chosen_on` has other samples, such as the first part of a split,
+    /// held-out rows are asked of models that were fitted to those.
     ///
     /// # Errors
-    /// [`Error::Undetermined`] where nothing can be chosen, or less than is asked for; [`Error::Data`] where sums leave the range of
-    /// numbers.
+    /// [`Error::Undetermined`] where nothing can be chosen, or less than is asked for; [`Error::Data`] where sums leave
+    /// the range of numbers.
     pub(crate) fn choose(
         &self,
         candidates: &Candidates,
@@ -496,7 +497,8 @@ impl<'l> Samples<'l> {
             .sum::<f64>();
         let degrees = self.rows.len() - count;
         let variance = left / degrees as f64;
-        // solve() counts the rows of a ridge among the samples: the shape of its covariance holds, its variance is that of the samples.
+        // solve() counts the rows of a ridge among the samples: the shape of its covariance holds, its variance is that
+        // of the samples.
         let own = solution.residual_variance().filter(|own| *own > 0.0);
         let covariance = solution.covariance().zip(own).map(|(covariance, own)| {
             let entry = |i: usize, j: usize| covariance[(i, j)] * variance / own / (sizes[i] * sizes[j]);

@@ -4,29 +4,31 @@
 //! A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + k + m r(t) + C(q)/D(q) e(t),   r(t) = (t - t_m)/h
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, section 14.1: the offset as a parameter). 1 and r are two more inputs with one
-//! coefficient, no delay and no F: every way to estimate has them at no further cost in concepts. t_m is the middle of the
-//! estimation rows and h half their length in time. As an offset of the output, A(q) (y(t) - l(t)) = ..., this is the line
+//! (Ljung, System Identification, 2nd ed. 1999, section 14.1: the offset as a parameter). 1 and r are two more inputs
+//! with one coefficient, no delay and no F: every way to estimate has them at no further cost in concepts. t_m is the
+//! middle of the estimation rows and h half their length in time. As an offset of the output, A(q) (y(t) - l(t)) = ...,
+//! this is the line
 //!
 //! ```text
 //! l(t) = level + slope (t - t_m):   slope = m/(h A(1)),   level = k/A(1) + m T S/(h A(1)^2),   S = sum_i i a_i,
 //! ```
 //!
-//! T being the sample time, as A(q) t = A(1) t - T S. So predictions and simulations know nothing of it: they see deviations.
-//! Standard errors are those of the parameters to first order (see `model::dynamics`). An integrator, A(1) = 0, has no level.
+//! T being the sample time, as A(q) t = A(1) t - T S. So predictions and simulations know nothing of it: they see
+//! deviations. Standard errors are those of the parameters to first order (see `model::dynamics`). An integrator,
+//! A(1) = 0, has no level.
 //!
-//! An offset that is taken off before, as a mean or a line, is an estimate too, and mostly not the best one. What all this leaves
-//! open of the output, together with the parameters, goes with the model (see [`OffsetCovariance`]).
+//! An offset that is taken off before, as a mean or a line, is an estimate too, and mostly not the best one. What all
+//! this leaves open of the output, together with the parameters, goes with the model (see [`OffsetCovariance`]).
 //!
-//! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N. For
-//! models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations; for others
-//! the decrease that one Gauss-Newton step predicts (Rao's score test, Proc. Cambridge Philosophical Society 44, 1948) says
-//! whether a second search can change the answer. The errors of an output-error model may have any colour, and slow ones look
-//! like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of the colour (Wald's test, which is
-//! the same as the first one where errors are white). Near an integrator a level may be anything beside an initial condition
-//! and a pole, and k^2/var k says nothing: there N_e ln(V_0/V_1) > 8 ln N does as well, where N_e = N var e/S(0) white samples
-//! tell a mean as well as N errors e of spectral density S do (Kent, Biometrika 69, 1982, on likelihood ratios of models that
-//! do not hold).
+//! Whether a constant is worth its parameter is decided by MDL (Rissanen, Automatica 14, 1978): N ln(V_0/V_1) > ln N.
+//! For models that are linear in their parameters V_1 follows from V_0, the residuals' sum and the normal equations;
+//! for others the decrease that one Gauss-Newton step predicts (Rao's score test, Proc. Cambridge Philosophical Society
+//! 44, 1948) says whether a second search can change the answer. The errors of an output-error model may have any
+//! colour, and slow ones look like an offset: there k^2/var k > ln N is asked for too, with the variance that knows of
+//! the colour (Wald's test, which is the same as the first one where errors are white). Near an integrator a level may
+//! be anything beside an initial condition and a pole, and k^2/var k says nothing: there N_e ln(V_0/V_1) > 8 ln N does
+//! as well, where N_e = N var e/S(0) white samples tell a mean as well as N errors e of spectral density S do (Kent,
+//! Biometrika 69, 1982, on likelihood ratios of models that do not hold).
 
 mod beside;
 mod normal_equations;
@@ -135,12 +137,12 @@ impl<D> Clone for Task<'_, D> {
 impl<D> Copy for Task<'_, D> {}
 
 impl<D: ExperimentData> Task<'_, D> {
-    /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `start` has the
-    /// parameters of a model with both, where a choice among models has found some.
+    /// The estimate with a constant, if that is asked for or worth it, and with a trend, if `beside` has one. `start`
+    /// has the parameters of a model with both, where a choice among models has found some.
     ///
     /// # Errors
-    /// As for [`estimate`](super::estimate()); [`Error::Argument`] where the constant does not go with method or initial
-    /// condition; [`Error::Undetermined`] where the data do not tell it, or there is no level.
+    /// As for [`estimate`](super::estimate()); [`Error::Argument`] where the constant does not go with method or
+    /// initial condition; [`Error::Undetermined`] where the data do not tell it, or there is no level.
     pub(crate) fn fit(
         &self,
         constant: Constant,
@@ -306,9 +308,9 @@ impl<D: ExperimentData> Task<'_, D> {
         estimate_of_channels(&data, self.inputs, &orders, &method, initial, self.monitor)
     }
 
-    /// What an estimate without a constant leaves open of an offset that was taken off before, as a mean or a line: the covariance
-    /// that all parameters would have if it were estimated with them, and the square of what that would change, as it was not.
-    /// None where the covariance of the parameters is not known.
+    /// What an estimate without a constant leaves open of an offset that was taken off before, as a mean or a line: the
+    /// covariance that all parameters would have if it were estimated with them, and the square of what that would
+    /// change, as it was not. None where the covariance of the parameters is not known.
     ///
     /// With d = (d theta, k, m) the step from (theta, 0, 0) to the estimate of all, whose error has the covariance P,
     ///

@@ -34,8 +34,8 @@ pub struct SearchOutcome {
     pub iterations: usize,
     /// The mean of e^2 at the start and after each iteration.
     pub costs: Vec<f64>,
-    /// The norm of the gradient at the end, each of its entries taken as the cosine between e and a column of psi: 0 at a
-    /// minimum, whatever the units.
+    /// The norm of the gradient at the end, each of its entries taken as the cosine between e and a column of psi: 0 at
+    /// a minimum, whatever the units.
     pub gradient_norm: f64,
     /// Why it stopped.
     pub stopped: Stopped,
@@ -45,8 +45,8 @@ pub struct SearchOutcome {
     pub unstable_steps: usize,
     /// The initial conditions that were estimated.
     pub initial_conditions: usize,
-    /// How many samples, in stretches spread over the log, the starts were compared and searched on before the search on all
-    /// of them; none if these were all.
+    /// How many samples, in stretches spread over the log, the starts were compared and searched on before the search
+    /// on all of them; none if these were all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_samples: Option<usize>,
     /// The start that won.

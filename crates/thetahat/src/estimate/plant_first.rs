@@ -1,18 +1,20 @@
 //! The plant that simulates best, and the noise behind it.
 //!
-//! The plant minimises the errors of its free run, as a model of output error does; what these errors are made of is found after it:
+//! The plant minimises the errors of its free run, as a model of output error does; what these errors are made of is
+//! found after it:
 //!
 //! ```text
 //! y = B/F u + v,  sum v^2 least;   then D v = C e, sum e^2 least          Box-Jenkins, output error
 //! y = B/A u + v,  sum v^2 least;   then A v = C e, sum e^2 least over C   ARX, ARMAX
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, sections 8.5 and 10.4: what is right for the true plant in any noise, and
-//! where the plant is not among the models closest to it in the frequencies that the input has). The least sum of e^2 over all parameters
-//! weighs the plant's errors by 1/H instead, which looks away from slow ones. Several inputs share A (see `shared`).
+//! (Ljung, System Identification, 2nd ed. 1999, sections 8.5 and 10.4: what is right for the true plant in any noise,
+//! and where the plant is not among the models closest to it in the frequencies that the input has). The least sum of
+//! e^2 over all parameters weighs the plant's errors by 1/H instead, which looks away from slow ones. Several inputs
+//! share A (see `shared`).
 //!
-//! The covariance of the plant is that of output error, with coloured errors; that of the noise is its own. Estimates of the
-//! two do not correlate without feedback (Ljung 1999, section 9.4).
+//! The covariance of the plant is that of output error, with coloured errors; that of the noise is its own. Estimates
+//! of the two do not correlate without feedback (Ljung 1999, section 9.4).
 
 mod shared;
 

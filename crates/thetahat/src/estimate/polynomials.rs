@@ -70,8 +70,8 @@ impl Polynomials {
     }
 }
 
-/// The parameters of a model with the same delays and orders that are not above the others', as parameters of the latter:
-/// the polynomials end with zeros.
+/// The parameters of a model with the same delays and orders that are not above the others', as parameters of the
+/// latter: the polynomials end with zeros.
 pub(crate) fn extended(from: &Orders, parameters: &[f64], to: &Orders) -> Vec<f64> {
     let mut polynomials = Polynomials::new(from, parameters);
     polynomials.a.resize(to.na + 1, 0.0);

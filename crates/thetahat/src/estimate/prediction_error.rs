@@ -1,5 +1,5 @@
-//! The estimate of least squared prediction errors for the general family: search, initial conditions, covariance; where the
-//! search begins is in `ranking`, and what it takes from smaller models in `nested`.
+//! The estimate of least squared prediction errors for the general family: search, initial conditions, covariance;
+//! where the search begins is in `ranking`, and what it takes from smaller models in `nested`.
 
 mod nested;
 mod ranking;
@@ -56,8 +56,8 @@ fn begins(
     }
 }
 
-/// Fits A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t) by a search for the least sum of squared prediction
-/// errors from several starts; an ARX model in one step.
+/// Fits A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t - nk_j) + C(q)/D(q) e(t) by a search for the least sum of squared
+/// prediction errors from several starts; an ARX model in one step.
 pub(super) fn prediction_error<D: ExperimentData>(
     data: &D,
     orders: &Orders,
@@ -134,8 +134,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// The best start for the search on the whole record.
     ///
-    /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a few
-    /// iterations on all samples are left.
+    /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a
+    /// few iterations on all samples are left.
     fn beginning<D: ExperimentData>(
         &self,
         data: &D,
@@ -177,8 +177,8 @@ impl Job<'_> {
 
     /// Searches from the beginning, if that was not done before. The predictor is left at what was found.
     ///
-    /// A search that is not soon at its end may be on the way to a minimum of its own: then starts from nested models are
-    /// compared with what it found, and always where these models are few and the record is not long.
+    /// A search that is not soon at its end may be on the way to a minimum of its own: then starts from nested models
+    /// are compared with what it found, and always where these models are few and the record is not long.
     fn search_from(
         &self,
         data: &impl ExperimentData,
@@ -271,7 +271,8 @@ impl Job<'_> {
         Ok(Reached { predictor: estimated, found: free, initial: Initial::Estimate })
     }
 
-    /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial conditions.
+    /// Estimates what inputs before the record have done where that is worth its parameters, beside the other initial
+    /// conditions.
     ///
     /// No search is done where a step predicts that it cannot change the answer.
     fn with_inputs<'d, D: ExperimentData>(
@@ -355,7 +356,8 @@ impl Job<'_> {
         let initial_conditions = predictor.initial_conditions();
         let noise_variance = cost / (samples - size - initial_conditions) as f64;
         let known = uncertainty(predictor, orders, noise_variance);
-        // At a minimum only a flat cost has none; elsewhere, and at the border of stability, it may be a matter of the place.
+        // At a minimum only a flat cost has none; elsewhere, and at the border of stability, it may be a matter of the
+        // place.
         let settled =
             matches!(found.stopped, Stopped::Converged | Stopped::NoDescent) && !found.stability_bound;
         if known.is_none() && settled {
@@ -443,8 +445,8 @@ fn uncertainty(
     let covariance = if orders.structure() == Structure::Oe {
         let taken = orders.parameters() + predictor.initial_conditions();
         let colour = predictor.restricted_autoregression(taken)?;
-        // On columns that are orthogonal: where parameters can hardly be told apart, the sums over psi itself would lose them
-        // in rounding twice, and variances could come out negative.
+        // On columns that are orthogonal: where parameters can hardly be told apart, the sums over psi itself would
+        // lose them in rounding twice, and variances could come out negative.
         let products = predictor.backward_filtered_products(&root.transpose(), &colour.monic)?;
         coloured(&root, colour.variance * colour.inflation(predictor.samples(), taken), &products)
     } else {
@@ -453,8 +455,8 @@ fn uncertainty(
     Some(Uncertainty { covariance: rows(&covariance), condition })
 }
 
-/// The covariance of all parameters of a model of which some were not estimated, those of a constant and a trend, if they were,
-/// and the Gauss-Newton step to their estimate. None where they cannot be told from the others.
+/// The covariance of all parameters of a model of which some were not estimated, those of a constant and a trend, if
+/// they were, and the Gauss-Newton step to their estimate. None where they cannot be told from the others.
 pub(super) fn beside(
     data: &impl ExperimentData,
     orders: &Orders,
@@ -485,8 +487,8 @@ pub(super) fn predictor_of<'d, D: ExperimentData>(
     predictor
 }
 
-/// The covariance of an estimate of least squares whose errors are coloured, whatever its structure: of `uncertainty` with
-/// psi filtered backwards in time by an autoregression of the errors. None where it cannot be had.
+/// The covariance of an estimate of least squares whose errors are coloured, whatever its structure: of `uncertainty`
+/// with psi filtered backwards in time by an autoregression of the errors. None where it cannot be had.
 pub(super) fn coloured_covariance(
     record: &Record<'_>,
     orders: &Orders,
@@ -522,9 +524,9 @@ pub(super) fn is_determined(predictor: &impl PredictionErrors) -> bool {
     inverse_root(predictor).is_some()
 }
 
-/// R^-1 with R'R = G, so that psi R^-1 has orthonormal columns, and the condition number of psi. By Cholesky of the Gram
-/// matrix, or by QR where that is not exact enough: what is left of a column beside free responses that are nearly the same has
-/// lost as many digits as a condition number would take.
+/// R^-1 with R'R = G, so that psi R^-1 has orthonormal columns, and the condition number of psi. By Cholesky of the
+/// Gram matrix, or by QR where that is not exact enough: what is left of a column beside free responses that are nearly
+/// the same has lost as many digits as a condition number would take.
 pub(super) fn inverse_root(predictor: &impl PredictionErrors) -> Option<(DMatrix<f64>, f64)> {
     let size = predictor.right().len();
     let matrix = DMatrix::from_row_slice(size, size, predictor.matrix());

@@ -15,14 +15,15 @@
 //! So an iteration filters once for each polynomial, and the Gram matrix of psi comes from lagged products of these
 //! signals: O(N p), and no matrix of N rows.
 //!
-//! A section is a segment with the measured samples directly before it that its errors reach back to, as far as they are
-//! there. Samples before the section are unknown, and zero in all that follows. What they do to x_j is a combination of free
-//! responses q^-i (1/F_j) delta, i = s, s + 1, …, with weights that are estimated too, apart for each section: they enter e
-//! linearly and are eliminated from the normal equations. The first error that counts needs x_j from sample s on: nf of them are
-//! enough where the inputs from nb + nk - 1 samples before s on are known or taken to be zero, and one more for each unknown
-//! one is needed where not. The other polynomials reach back to nothing unknown in the samples that count; where there is C,
-//! v = D w is set to zero in the r samples before these. Then psi is a shifted copy only up to what the mask cuts off. With z the
-//! signal before the mask and g the impulse response of 1/C from sample r on,
+//! A section is a segment with the measured samples directly before it that its errors reach back to, as far as they
+//! are there. Samples before the section are unknown, and zero in all that follows. What they do to x_j is a
+//! combination of free responses q^-i (1/F_j) delta, i = s, s + 1, …, with weights that are estimated too, apart for
+//! each section: they enter e linearly and are eliminated from the normal equations. The first error that counts needs
+//! x_j from sample s on: nf of them are enough where the inputs from nb + nk - 1 samples before s on are known or taken
+//! to be zero, and one more for each unknown one is needed where not. The other polynomials reach back to nothing
+//! unknown in the samples that count; where there is C, v = D w is set to zero in the r samples before these. Then psi
+//! is a shifted copy only up to what the mask cuts off. With z the signal before the mask and g the impulse response of
+//! 1/C from sample r on,
 //!
 //! ```text
 //! (1/C) mask(q^-i z) = q^-i (1/C) mask(z) + sum_{k < i} z(r + k - i) q^-k g,
@@ -30,8 +31,8 @@
 //!
 //! so that shifts of g complete the Gram matrix exactly.
 //!
-//! Without A, C and D an error depends on the output of its own sample only. A section goes on through missing outputs then: the
-//! samples that count are several runs, with a part of the Gram matrix each.
+//! Without A, C and D an error depends on the output of its own sample only. A section goes on through missing outputs
+//! then: the samples that count are several runs, with a part of the Gram matrix each.
 
 mod columns;
 mod loss;
@@ -72,7 +73,8 @@ struct Layout {
     products: Products,
     parameters: usize,
     free: usize,
-    /// How many of the initial-condition responses each input has, and the sample of the section that the first begins at.
+    /// How many of the initial-condition responses each input has, and the sample of the section that the first begins
+    /// at.
     own_free: Vec<usize>,
     origin: usize,
     /// r, the first samples of the section in which v = 0; none without C.
@@ -115,8 +117,8 @@ pub(crate) enum InitialCondition {
     UnknownInputs,
 }
 
-/// Samples that are left out in each segment, whatever the model and what is known of its past: the first ones in which v = 0, and
-/// the first that counts.
+/// Samples that are left out in each segment, whatever the model and what is known of its past: the first ones in which
+/// v = 0, and the first that counts.
 #[derive(Debug, Clone, Copy)]
 struct Common {
     left_out: usize,
@@ -124,8 +126,8 @@ struct Common {
 }
 
 impl Layout {
-    /// That of sections that begin `past` samples before their segment. Where all F are one, their initial-condition responses are those of an
-    /// input.
+    /// That of sections that begin `past` samples before their segment. Where all F are one, their initial-condition
+    /// responses are those of an input.
     fn new(orders: &Orders, begin: InitialCondition, past: usize, common: Option<Common>, one: bool) -> Self {
         let inputs = orders.inputs();
         let unknown = begin != InitialCondition::Zero;
@@ -133,7 +135,8 @@ impl Layout {
         let skipped = if unknown { left_out.max(orders.conditioned()) } else { 0 };
         let conditioned = if orders.nc > 0 { skipped } else { 0 };
         let counted = common.map_or(skipped, |common| common.counted.max(skipped));
-        // Responses begin with the section where nothing is known of it; models on common samples have responses of the same age.
+        // Responses begin with the section where nothing is known of it; models on common samples have responses of the
+        // same age.
         let at_rest = begin == InitialCondition::Unknown && past == 0;
         let origin = if unknown && common.is_none() && !at_rest { skipped - orders.nd } else { 0 };
         let free = |input: usize| match begin {
@@ -310,9 +313,9 @@ impl<'a> Predictor<'a> {
             })
     }
 
-    /// The samples that are the same for all models: at least the first `left_out` samples of each segment have e = 0, and at least
-    /// the first `counted` do not count. Segments without a sample that counts, or with no more than the initial-condition responses need, are left out.
-    /// What was measured before a segment is not used.
+    /// The samples that are the same for all models: at least the first `left_out` samples of each segment have e = 0,
+    /// and at least the first `counted` do not count. Segments without a sample that counts, or with no more than the
+    /// initial-condition responses need, are left out. What was measured before a segment is not used.
     pub(super) fn counting(
         record: &Record<'a>,
         orders: &Orders,
@@ -362,7 +365,8 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(|section| section.free.len()).sum()
     }
 
-    /// ln det(I + `ratio` G) of the initial-condition responses' part G of the Gram matrix, at the current point, over all segments.
+    /// ln det(I + `ratio` G) of the initial-condition responses' part G of the Gram matrix, at the current point, over
+    /// all segments.
     pub(super) fn free_information(&self, ratio: f64) -> f64 {
         let parameters = self.right.len();
         let of = |section: &Section<'_>| {
@@ -377,7 +381,8 @@ impl<'a> Predictor<'a> {
         self.sections.iter().map(of).sum()
     }
 
-    /// By how much a column of psi is at most larger than what the initial-condition responses leave of it, at the current point.
+    /// By how much a column of psi is at most larger than what the initial-condition responses leave of it, at the
+    /// current point.
     pub(super) fn cancellation(&self) -> f64 {
         let parameters = self.right.len();
         let ratio = |k: usize| self.square_of(k) / self.matrix[k * parameters + k];
@@ -418,8 +423,8 @@ impl<'a> Predictor<'a> {
         self.sections.iter().flat_map(|section| &section.trial).copied().collect()
     }
 
-    /// The steps to the best weights, at the current point: for each segment that for no change of the parameters, then what each of
-    /// them takes from it.
+    /// The steps to the best weights, at the current point: for each segment that for no change of the parameters, then
+    /// what each of them takes from it.
     pub(super) fn free_steps(&self) -> Vec<f64> {
         self.sections.iter().flat_map(|section| &section.free_steps).copied().collect()
     }
@@ -538,8 +543,8 @@ impl<'a> Predictor<'a> {
         (errors, segments)
     }
 
-    /// psi without the initial-condition responses for the same samples, a list for each parameter, zero where an output is missing. For models
-    /// of output error, at the current point.
+    /// psi without the initial-condition responses for the same samples, a list for each parameter, zero where an
+    /// output is missing. For models of output error, at the current point.
     pub(super) fn sensitivities(&self) -> Vec<Vec<f64>> {
         let mut all = vec![Vec::with_capacity(self.samples); self.right.len()];
         for (section, columns) in self.sections.iter().zip(self.columns()) {
@@ -551,8 +556,9 @@ impl<'a> Predictor<'a> {
         all
     }
 
-    /// sum zeta zeta' over all samples, zeta being `weights` psi without the initial-condition responses, zero where samples do not count,
-    /// filtered backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the current point.
+    /// sum zeta zeta' over all samples, zeta being `weights` psi without the initial-condition responses, zero where
+    /// samples do not count, filtered backwards in time by 1/A(q^+1), A = `monic`. For models of output error, at the
+    /// current point.
     pub(super) fn backward_filtered_products(&self, weights: &DMatrix<f64>, monic: &[f64]) -> DMatrix<f64> {
         let parameters = self.right.len();
         let mut sum = DMatrix::zeros(weights.nrows(), weights.nrows());
@@ -566,8 +572,8 @@ impl<'a> Predictor<'a> {
         sum
     }
 
-    /// The triangular factor of psi without the initial-condition responses, at the current point, as exact as Householder QR.
-    /// 2 N (p + n)^2 flops for n initial-condition responses in a segment.
+    /// The triangular factor of psi without the initial-condition responses, at the current point, as exact as
+    /// Householder QR. 2 N (p + n)^2 flops for n initial-condition responses in a segment.
     ///
     /// # Errors
     /// If an entry is not finite, or too large for squares to be summed without overflow.
@@ -645,7 +651,8 @@ impl<'a> Predictor<'a> {
         }
     }
 
-    /// Sets the weights of the initial-condition responses to those that are best for a step of the parameters, to first order.
+    /// Sets the weights of the initial-condition responses to those that are best for a step of the parameters, to
+    /// first order.
     pub(super) fn try_free(&mut self, step: &[f64]) {
         self.sections.iter_mut().for_each(|section| section.try_free(step));
     }

@@ -4,12 +4,14 @@
 //! min over shape, theta, weights of sum e(t)^2,   e = y - sum_j w_j'c_j(t; shape_j, theta_j) - level - slope (t - t_m) - free response
 //! ```
 //!
-//! Gains, level, slope and the free response enter linearly and are least squares for each shape and dead time: variable projection
-//! (Golub and Pereyra 1973), with Kaufman's derivative (1975), psi less its part in the span of these columns. The search moves the logarithms of
-//! time constants, and the dead times. It starts from the best of a grid with one lag, and adds lags one by one.
+//! Gains, level, slope and the free response enter linearly and are least squares for each shape and dead time:
+//! variable projection (Golub and Pereyra 1973), with Kaufman's derivative (1975), psi less its part in the span of
+//! these columns. The search moves the logarithms of time constants, and the dead times. It starts from the best of a
+//! grid with one lag, and adds lags one by one.
 //!
-//! Residuals of a plant that nobody drives by noise alone have a colour, and there the covariance of white noise is far too small. It is that
-//! of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`), and no standard error is less than that of white errors.
+//! Residuals of a plant that nobody drives by noise alone have a colour, and there the covariance of white noise is far
+//! too small. It is that of errors e = v/A(q), A an autoregression of the residuals (see `uncertainty`), and no
+//! standard error is less than that of white errors.
 
 mod objective;
 mod refined;
@@ -34,7 +36,8 @@ pub(crate) use objective::{Background, ResponsePoints};
 /// How a process was found: by the least errors of its free run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProcessOutcome {
-    /// The standard errors of the parameters if the errors were white, in their order: those of the model are for errors of any colour.
+    /// The standard errors of the parameters if the errors were white, in their order: those of the model are for
+    /// errors of any colour.
     pub white_standard_errors: Vec<Option<f64>>,
     /// The order of the autoregression that the colour of the errors was taken from.
     pub noise_order: usize,
@@ -88,8 +91,8 @@ pub(crate) struct ProcessEstimate {
 /// Fits processes from held inputs, which are deviations, to an output; `output` and `held` are of the same whole log.
 ///
 /// # Errors
-/// [`Error::Undetermined`] if there are too few samples, or they do not determine a parameter; [`Error::Data`] if squares leave the
-/// range of numbers; [`Error::Interrupted`] if the monitor says so.
+/// [`Error::Undetermined`] if there are too few samples, or they do not determine a parameter; [`Error::Data`] if
+/// squares leave the range of numbers; [`Error::Interrupted`] if the monitor says so.
 pub(crate) fn least_free_run(
     structures: &[ProcessStructure],
     names: &[String],
@@ -102,8 +105,8 @@ pub(crate) fn least_free_run(
     least(objective, structures, names, background.columns(held, structures), options, monitor)
 }
 
-/// The same from the parameters of another fit, whose dead times it has, and without any uncertainty. None where a time constant moves
-/// by more than a factor of 1.5: these samples do not determine it.
+/// The same from the parameters of another fit, whose dead times it has, and without any uncertainty. None where a time
+/// constant moves by more than a factor of 1.5: these samples do not determine it.
 ///
 /// # Errors
 /// As for [`least_free_run`].
@@ -239,7 +242,8 @@ struct Uncertainty {
     condition: Option<f64>,
 }
 
-/// The covariance of a fit to points, whose errors are independent: as large as the points say, and larger where they are missed by more.
+/// The covariance of a fit to points, whose errors are independent: as large as the points say, and larger where they
+/// are missed by more.
 fn of_points(
     root: Option<DMatrix<f64>>,
     used: &[usize],
@@ -269,8 +273,8 @@ fn uncertainty(
 ) -> Result<Uncertainty, Error> {
     let psi = objective.slopes(structures, parts);
     let kept = names.len() + objective.background().offsets();
-    // The columns of unit norm, those of level, slope and free responses first: what follows is what they leave. Last the dead times of
-    // outputs that jump, which others may stand for: see `past_jumps`.
+    // The columns of unit norm, those of level, slope and free responses first: what follows is what they leave. Last
+    // the dead times of outputs that jump, which others may stand for: see `past_jumps`.
     let norms: Vec<f64> = psi.iter().map(|column| sum_of_squares(column).sqrt()).collect();
     let jumping = jumping_dead_times(structures);
     // An integrator's own state is a level: that is kept of the two.
@@ -355,7 +359,8 @@ fn uncertainty(
         let further = open.iter().map(|(moves, variance)| variance * moves[i] * moves[j]);
         Some(own + further.sum::<f64>())
     };
-    // What a wrong structure leaves may be foretold by its past so well that nothing seems open. No error is less than for white errors.
+    // What a wrong structure leaves may be foretold by its past so well that nothing seems open. No error is less than
+    // for white errors.
     let larger = |i: usize| {
         let ratio =
             entry(&plain, i, i).zip(entry(&spread, i, i)).map(|(plain, spread)| (plain / spread).sqrt());

@@ -27,7 +27,8 @@ const NOTHING_LEFT: f64 = 1e-16;
 const EXACT: f64 = 1e-12;
 /// Iterations along the directions of one point.
 const ROUND: usize = 10;
-/// A direction whose information is below this fraction of that of the others, each direction by itself having 1, is not seen.
+/// A direction whose information is below this fraction of that of the others, each direction by itself having 1, is
+/// not seen.
 const UNSEEN: f64 = 1e-12;
 
 /// Whose errors a refinement makes small.
@@ -126,13 +127,14 @@ pub(crate) struct Refined {
     pub(crate) search: SearchOutcome,
 }
 
-/// Searches for the model of the least ln det cov e, e being errors one step ahead or of the free run, each segment from the state that fits it
-/// best.
+/// Searches for the model of the least ln det cov e, e being errors one step ahead or of the free run, each segment
+/// from the state that fits it best.
 ///
-/// A step moves all entries of the matrices but along changes of coordinates, in which nothing changes: the directions are an orthonormal
-/// basis of what is orthogonal to these, taken anew after some iterations (McKelvey, Helmersson and Ribarits, Data driven local coordinates,
-/// Automatica 40, 2004). Signals and states are in units in which they are of size one, errors in those in which the start's have covariance
-/// I. One search from each start, side by side; the least errors win, and the first of equal ones.
+/// A step moves all entries of the matrices but along changes of coordinates, in which nothing changes: the directions
+/// are an orthonormal basis of what is orthogonal to these, taken anew after some iterations (McKelvey, Helmersson and
+/// Ribarits, Data driven local coordinates, Automatica 40, 2004). Signals and states are in units in which they are of
+/// size one, errors in those in which the start's have covariance I. One search from each start, side by side; the
+/// least errors win, and the first of equal ones.
 ///
 /// With prediction errors the covariance of the entries is the inverse of the information,
 ///
@@ -140,9 +142,9 @@ pub(crate) struct Refined {
 /// (sum psi' R^-1 psi)^-1 N/(N - p/l),   psi = -de/dtheta,   R = cov e
 /// ```
 ///
-/// (Ljung, System Identification, 2nd ed. 1999, section 9.3). Errors of a free run are coloured: with G that sum and g that of psi' R^-1 e it is
-/// G^-1 (cov g) G^-1, cov g being that of the noise of the model that was found (section 9.4 there); K has the errors that it has where
-/// the plant is known.
+/// (Ljung, System Identification, 2nd ed. 1999, section 9.3). Errors of a free run are coloured: with G that sum and g
+/// that of psi' R^-1 e it is G^-1 (cov g) G^-1, cov g being that of the noise of the model that was found (section 9.4
+/// there); K has the errors that it has where the plant is known.
 ///
 /// Cost: O(N (n + l) r (n + m + l)) an iteration for r = n (m + 2 l) directions.
 ///
@@ -257,8 +259,8 @@ struct Searched {
     found: Found,
 }
 
-/// A search in rounds: after each the states are in units in which they are of size one, and the directions those of where it stands. None if
-/// the start has no errors.
+/// A search in rounds: after each the states are in units in which they are of size one, and the directions those of
+/// where it stands. None if the start has no errors.
 fn searched(
     record: &JointRecord<'_>,
     (mut form, mut k): (Form, DMatrix<f64>),
@@ -332,8 +334,8 @@ fn best_predictor<'r>(
     Linearized::at(record, Refine::Prediction, errors.form(&found.parameters), basis, floor)
 }
 
-/// Directions in which errors may become smaller: across all changes of coordinates, then D and the levels as far as they are free. None
-/// where singular values do not converge.
+/// Directions in which errors may become smaller: across all changes of coordinates, then D and the levels as far as
+/// they are free. None where singular values do not converge.
 fn directions(form: &Form, what: Refinement) -> Option<DMatrix<f64>> {
     let across = across_coordinates(&form.a, &[&form.b], &form.h)?;
     let direct = if what.feedthrough { form.d.len() } else { 0 };
@@ -374,8 +376,8 @@ impl<'r> Linearized<'r> {
         StateSpace { noise_covariance: self.errors.covariance.clone(), ..self.form.model() }
     }
 
-    /// How the matrices of the model vary: as many independent variations of variance 1 as there are directions. Their covariance is
-    /// G^-1, or G^-1 (cov g) G^-1 where that is another one. None where a direction is not seen.
+    /// How the matrices of the model vary: as many independent variations of variance 1 as there are directions. Their
+    /// covariance is G^-1, or G^-1 (cov g) G^-1 where that is another one. None where a direction is not seen.
     fn variations(&self, scores: Option<&[f64]>) -> Option<Vec<StateSpace>> {
         let size = self.basis.ncols();
         let matrix = DMatrix::from_row_slice(size, size, self.errors.matrix());

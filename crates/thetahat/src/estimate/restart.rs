@@ -12,18 +12,19 @@ use crate::model::{
     polynomial::{product, roots},
 };
 
-/// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its angle.
+/// The standard deviation of a change of a root: of the logarithms of its distance from the unit circle and of its
+/// angle.
 const SPREAD: f64 = 0.7;
 /// Of a new root: its least distance from the unit circle, and its least angle.
 const NEAREST: f64 = 1e-3;
 const SMALLEST_ANGLE: f64 = 1e-3 * PI;
 
-/// This many parameter vectors, with C, D and every F drawn at random, A and B as they are in `best`. The same seed gives the
-/// same ones.
+/// This many parameter vectors, with C, D and every F drawn at random, A and B as they are in `best`. The same seed
+/// gives the same ones.
 ///
-/// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by factors
-/// on the distance 1 - |z| from the unit circle and on the angle; the others have new ones, these two numbers being
-/// uniform on a logarithmic scale, as the time constants and frequencies of plants are. A and B, which are linear
+/// C, D and F are drawn by their roots: every second vector has all of them moved from where they are in `best`, by
+/// factors on the distance 1 - |z| from the unit circle and on the angle; the others have new ones, these two numbers
+/// being uniform on a logarithmic scale, as the time constants and frequencies of plants are. A and B, which are linear
 /// once C, D and F are given, are left to [`best_linear`](thetahat_numerics::optimize::best_linear).
 pub(super) fn restarts(
     orders: &Orders,

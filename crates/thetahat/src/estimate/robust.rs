@@ -6,15 +6,16 @@
 //! V = sum rho(e),   rho(e) = e^2/2 for |e| <= d,   d |e| - d^2/2 beyond
 //! ```
 //!
-//! (Huber, Robust Statistics, 1981, chapters 4 and 7). Huber's estimate has d = k s, where s is the scale of the errors,
-//! the median of |e - median(e)| over 0.6745 of the estimate of least absolute errors, held fixed (Holland and Welsch,
-//! Robust regression using iteratively reweighted least squares, 1977). The estimate of least absolute errors is the limit d -> 0:
-//! d goes down to a thousandth of s, and linear programs lead from there to its least value ([`minimax`]): where the search
-//! with d ends in a narrow valley, up to some per cent lower.
+//! (Huber, Robust Statistics, 1981, chapters 4 and 7). Huber's estimate has d = k s, where s is the scale of the
+//! errors, the median of |e - median(e)| over 0.6745 of the estimate of least absolute errors, held fixed (Holland and
+//! Welsch, Robust regression using iteratively reweighted least squares, 1977). The estimate of least absolute errors
+//! is the limit d -> 0: d goes down to a thousandth of s, and linear programs lead from there to its least value
+//! ([`minimax`]): where the search with d ends in a narrow valley, up to some per cent lower.
 //!
-//! It starts from the estimate of least squares, and from that of outputs y^ + psi(e) in which errors are cut off at 1.345
-//! scales (Huber 1981, section 7.8, modified residuals; Martin and Thomson, Robust-resistant spectrum estimation, 1982), as
-//! often as this makes the scale smaller: where wild samples lead least squares into another valley, the first does not return.
+//! It starts from the estimate of least squares, and from that of outputs y^ + psi(e) in which errors are cut off at
+//! 1.345 scales (Huber 1981, section 7.8, modified residuals; Martin and Thomson, Robust-resistant spectrum estimation,
+//! 1982), as often as this makes the scale smaller: where wild samples lead least squares into another valley, the
+//! first does not return.
 //!
 //! The search is that of least squares with sums weighted by w = psi(e)/e, psi = rho', which is min(1, d/|e|):
 //!
@@ -25,8 +26,8 @@
 //! As rho(sqrt(x)) is concave, the weighted sum of squares lies above V and touches it where the search stands: what
 //! lowers the one lowers the other (Huber 1981, section 7.8). A step is taken only if V itself falls.
 //!
-//! The covariance is that of least squares with another factor (Huber 1981, sections 7.6 and 7.10): with m = mean psi'(e), the
-//! part of the errors within d,
+//! The covariance is that of least squares with another factor (Huber 1981, sections 7.6 and 7.10): with m = mean
+//! psi'(e), the part of the errors within d,
 //!
 //! ```text
 //! Huber:            K^2 sum psi(e)^2/(N - p) / m^2 (sum psi psi')^-1,   K = 1 + (p/N) (1 - m)/m
@@ -35,9 +36,10 @@
 //!
 //! and for output error, whose errors may have a colour, psi(e) takes the place of e in the sandwich of `uncertainty`.
 //!
-//! What it withstands: any part of the errors below a half may be wild if the regressors are not, as in models of output error,
-//! whose gradient is made of the inputs. Where past outputs or errors are regressors (A, C, D), a wild output is a wild regressor
-//! in the next samples, and enough of them spoil any estimate of this kind (Huber 1981, section 7.9).
+//! What it withstands: any part of the errors below a half may be wild if the regressors are not, as in models of
+//! output error, whose gradient is made of the inputs. Where past outputs or errors are regressors (A, C, D), a wild
+//! output is a wild regressor in the next samples, and enough of them spoil any estimate of this kind (Huber 1981,
+//! section 7.9).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -102,7 +104,8 @@ pub struct RobustOutcome {
     pub k: Option<f64>,
     /// s, the scale of the errors in units of y.
     pub scale: f64,
-    /// d: errors count by their squares up to it, in units of y; for absolute errors before linear programs end the search.
+    /// d: errors count by their squares up to it, in units of y; for absolute errors before linear programs end the
+    /// search.
     pub bound: f64,
     /// The part of the errors that are larger.
     pub beyond: f64,

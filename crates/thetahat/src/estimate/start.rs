@@ -51,8 +51,8 @@ pub(super) struct Candidate {
 
 /// The starts for a model, the most promising recipe first. O(N p), some dozen passes over the data.
 ///
-/// A recipe that the data do not serve is left out. Segments begin with unknown initial conditions. After the deadline no
-/// recipe begins but the first, and no iteration of one.
+/// A recipe that the data do not serve is left out. Segments begin with unknown initial conditions. After the deadline
+/// no recipe begins but the first, and no iteration of one.
 ///
 /// # Errors
 /// As for [`arx`](super::arx()): [`Error::Undetermined`] if the data serve none, with the parameters concerned.

@@ -112,8 +112,8 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
         .sum()
 }
 
-/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts need to
-/// lead near the minimum, no more.
+/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts
+/// need to lead near the minimum, no more.
 pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) -> T) -> T {
     let runs = |segment: &Range<usize>| measured(record.output, segment);
     let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);

@@ -58,13 +58,15 @@ pub struct SubspaceOptions {
     pub weighting: Weighting,
     /// p, the past samples that the state is made of. By default that of the least AIC, 40 at most.
     pub past: Option<usize>,
-    /// s, the samples of the future that the past is asked of. By default p. For SSARX p at most: more would change nothing.
+    /// s, the samples of the future that the past is asked of. By default p. For SSARX p at most: more would change
+    /// nothing.
     pub future: Option<usize>,
-    /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not where past outputs
-    /// tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells of y(t) whatever D is.
+    /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not
+    /// where past outputs tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells
+    /// of y(t) whatever D is.
     pub feedthrough: Option<bool>,
-    /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow; of a
-    /// [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
+    /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow;
+    /// of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
     pub constant: bool,
 }
 
@@ -82,7 +84,8 @@ pub struct Subspace {
     highest: usize,
     /// The rows that make x(t) of z(t-1), …, z(t-p), x of the highest order.
     states: DMatrix<f64>,
-    /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order; with a constant those of deviations from the means.
+    /// The mean products of x(t), x(t+1), u(t) and y(t), x of the highest order; with a constant those of deviations
+    /// from the means.
     moments: DMatrix<f64>,
     /// These means.
     means: Option<DVector<f64>>,
@@ -129,8 +132,8 @@ pub struct OrderScore {
 /// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t)
 /// ```
 ///
-/// is fitted by least squares. As M_j = H (F - K H)^(j-1) [G - K D, K], what the past says of the next s outputs, less what later
-/// samples add, is
+/// is fitted by least squares. As M_j = H (F - K H)^(j-1) [G - K D, K], what the past says of the next s outputs, less
+/// what later samples add, is
 ///
 /// ```text
 /// Gamma x(t) = | M_1  M_2  …  M_p |
@@ -138,22 +141,23 @@ pub struct OrderScore {
 ///              | …                |
 /// ```
 ///
-/// Weighted by the root W of the inverse covariance of e, and by the root L of the products of the past, its singular values are those of
-/// W Gamma K_p L = U S V', and the state of order n is x = S^½ V' L^-1 z_past with its first n rows. (Jansson, Subspace identification
-/// and ARX modeling, IFAC SYSID 2003; Chiuso, Automatica 43, 2007.) Other than with MOESP, N4SID and CVA, whose equations are at
-/// [`Weighting`], nothing is projected on future inputs, so that it is consistent where the inputs are fed back.
+/// Weighted by the root W of the inverse covariance of e, and by the root L of the products of the past, its singular
+/// values are those of W Gamma K_p L = U S V', and the state of order n is x = S^½ V' L^-1 z_past with its first n
+/// rows. (Jansson, Subspace identification and ARX modeling, IFAC SYSID 2003; Chiuso, Automatica 43, 2007.) Other than
+/// with MOESP, N4SID and CVA, whose equations are at [`Weighting`], nothing is projected on future inputs, so that it
+/// is consistent where the inputs are fed back.
 ///
-/// The matrices follow by least squares, H and D from y on [x; u], and F, G and K from x(t+1) on [x; u; e] with the residuals
-/// e of the former. Where a controller feeds y(t) back to u(t), u(t) and e(t) are correlated: without e beside them, G and F would be
-/// biased.
+/// The matrices follow by least squares, H and D from y on [x; u], and F, G and K from x(t+1) on [x; u; e] with the
+/// residuals e of the former. Where a controller feeds y(t) back to u(t), u(t) and e(t) are correlated: without e
+/// beside them, G and F would be biased.
 ///
-/// Everything comes from the lagged products of all signals: O(N q^2 p) for q signals, then O((q p)^3); for the classical weightings with
-/// p + s in the place of p. Where p is not given, those of the longest past come first.
+/// Everything comes from the lagged products of all signals: O(N q^2 p) for q signals, then O((q p)^3); for the
+/// classical weightings with p + s in the place of p. Where p is not given, those of the longest past come first.
 /// Singular values below a millionth of the largest have few exact digits.
 ///
 /// # Errors
-/// [`Error::Argument`] for a past or a future of 0; [`Error::Data`] for a record without outputs; [`Error::Undetermined`] where there are too few
-/// samples for the lagged signals, or a signal is zero.
+/// [`Error::Argument`] for a past or a future of 0; [`Error::Data`] for a record without outputs;
+/// [`Error::Undetermined`] where there are too few samples for the lagged signals, or a signal is zero.
 ///
 /// ```
 /// use thetahat::data::JointRecord;
@@ -239,7 +243,8 @@ fn longest_past(data: &impl SubspaceData, most: usize) -> Result<usize, Error> {
 }
 
 /// # Errors
-/// [`Error::Undetermined`] if there are not more samples than lagged signals of a past, and of a future where one is projected on.
+/// [`Error::Undetermined`] if there are not more samples than lagged signals of a past, and of a future where one is
+/// projected on.
 fn enough(data: &impl SubspaceData, past: usize, future: Option<usize>) -> Result<(), Error> {
     let lags = past.saturating_add(future.map_or(0, |future| future - 1));
     let (samples, signals) = (data.samples(lags), signals(data, lags));
@@ -339,8 +344,8 @@ impl Subspace {
         self.means.is_some()
     }
 
-    /// The singular values of what the past says of the outputs to come, falling: for SSARX in units of the deviation of e, for MOESP and
-    /// N4SID in those of the outputs, and for CVA correlations.
+    /// The singular values of what the past says of the outputs to come, falling: for SSARX in units of the deviation
+    /// of e, for MOESP and N4SID in those of the outputs, and for CVA correlations.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }
@@ -350,16 +355,18 @@ impl Subspace {
         self.highest
     }
 
-    /// The model of an order, one sample every `sample_time` seconds. Over the samples its states are uncorrelated, and the variance of each
-    /// is its singular value.
+    /// The model of an order, one sample every `sample_time` seconds. Over the samples its states are uncorrelated, and
+    /// the variance of each is its singular value.
     ///
-    /// What the least squares leave of x(t+1) and y(t) is a noise of the states and one of the outputs. K and the covariance of e are those of
-    /// the stationary Kalman filter of these (Van Overschee and De Moor, Subspace Identification for Linear Systems, 1996, section 4.4): below
-    /// the order of the plant it predicts better than the K of the regression, which has all past samples at hand where the model has its
-    /// states only. At the plant's own order both are the same. Where no stationary filter exists, K is that of the regression. O(n^3).
+    /// What the least squares leave of x(t+1) and y(t) is a noise of the states and one of the outputs. K and the
+    /// covariance of e are those of the stationary Kalman filter of these (Van Overschee and De Moor, Subspace
+    /// Identification for Linear Systems, 1996, section 4.4): below the order of the plant it predicts better than the
+    /// K of the regression, which has all past samples at hand where the model has its states only. At the plant's own
+    /// order both are the same. Where no stationary filter exists, K is that of the regression. O(n^3).
     ///
     /// # Errors
-    /// [`Error::Argument`] for an order that is 0 or above the highest; [`Error::Undetermined`] where no gain gives a stable predictor.
+    /// [`Error::Argument`] for an order that is 0 or above the highest; [`Error::Undetermined`] where no gain gives a
+    /// stable predictor.
     pub fn state_space(&self, order: usize, sample_time: f64) -> Result<StateSpace, Error> {
         if order == 0 || order > self.highest {
             return Err(Error::argument(
@@ -375,14 +382,15 @@ impl Subspace {
         })
     }
 
-    /// Where the outputs of the model of an order stay while the inputs stay at zero, in units of the outputs: zero without a constant. With
-    /// it, of y = H x + D u + c_y + e and x(t+1) = F x + G u + K e + c_x,
+    /// Where the outputs of the model of an order stay while the inputs stay at zero, in units of the outputs: zero
+    /// without a constant. With it, of y = H x + D u + c_y + e and x(t+1) = F x + G u + K e + c_x,
     ///
     /// ```text
     /// H (I - F)^-1 c_x + c_y
     /// ```
     ///
-    /// None for an order without a model, and where F has an eigenvalue of 1: outputs that integrate stay nowhere. O(n^3).
+    /// None for an order without a model, and where F has an eigenvalue of 1: outputs that integrate stay nowhere.
+    /// O(n^3).
     pub fn levels(&self, order: usize) -> Option<Vec<f64>> {
         let Some(means) = &self.means else { return Some(vec![0.0; self.outputs]) };
         let model = if (1..=self.highest).contains(&order) { self.scaled(order, 1.0) } else { None }?;
@@ -470,12 +478,14 @@ impl Subspace {
     /// MDL = N ln det cov e + k ln N,   k = n (m + 2 l) + l m with feedthrough
     /// ```
     ///
-    /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a canonical form, Ljung,
-    /// System Identification, 2nd ed. 1999, section 4A). Of what the last states still leave of noise-free outputs, 1e-8 of their root mean
-    /// squares is nothing. Records of 2^18 samples and more are looked at in eight stretches of 2^14. O(N (n + l) (n + m + l)) for each order.
+    /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a
+    /// canonical form, Ljung, System Identification, 2nd ed. 1999, section 4A). Of what the last states still leave of
+    /// noise-free outputs, 1e-8 of their root mean squares is nothing. Records of 2^18 samples and more are looked at
+    /// in eight stretches of 2^14. O(N (n + l) (n + m + l)) for each order.
     ///
     /// # Errors
-    /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is 0 or above the highest.
+    /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is
+    /// 0 or above the highest.
     pub fn scores(
         &self,
         record: &JointRecord<'_>,
@@ -501,8 +511,8 @@ impl Subspace {
         })
     }
 
-    /// The same with so many samples, where `mean` gives the mean products of the errors of the model of an order with these levels, in units
-    /// of the scales.
+    /// The same with so many samples, where `mean` gives the mean products of the errors of the model of an order with
+    /// these levels, in units of the scales.
     fn scored(
         &self,
         samples: f64,
@@ -526,8 +536,8 @@ impl Subspace {
         orders.into_par_iter().map(score).collect()
     }
 
-    /// The rows that make e(t), one step ahead of the model of an order, of z(t), …, z(t-lags), all divided by their scales: its predictor starts
-    /// at the state `past` samples before the last of these. None where there is no model.
+    /// The rows that make e(t), one step ahead of the model of an order, of z(t), …, z(t-lags), all divided by their
+    /// scales: its predictor starts at the state `past` samples before the last of these. None where there is no model.
     fn errors_of_lags(&self, order: usize, lags: usize) -> Option<DMatrix<f64>> {
         let model = self.scaled(order, 1.0)?;
         let (m, width) = (self.inputs, self.inputs + self.outputs);
@@ -560,7 +570,8 @@ impl Subspace {
     /// The order of the least MDL among some, those above the highest left out.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is none in the range; [`Error::Undetermined`] where no model of them has a stable predictor.
+    /// [`Error::Argument`] if there is none in the range; [`Error::Undetermined`] where no model of them has a stable
+    /// predictor.
     pub fn order(&self, record: &JointRecord<'_>, orders: RangeInclusive<usize>) -> Result<usize, Error> {
         let orders = *orders.start()..=(*orders.end()).min(self.highest);
         if orders.is_empty() {

@@ -11,11 +11,11 @@
 //! (sum z phi')^-1 (Söderström and Stoica, Instrumental Variable Methods for System Identification, 1983, chapter 5).
 //! A is an autoregression of the residuals, its order chosen by MDL.
 //!
-//! Of short logs the fit takes a part of v with it, that in the directions of psi: v^ = v - psi'(theta-hat - theta) has too little
-//! there, and the intervals were too short. For output errors A is that of v instead, by the restricted likelihood of Patterson
-//! and Thompson (Biometrika 58 (1971)), found by expectation and maximisation (Dempster, Laird and Rubin, J. Royal Statistical
-//! Society B 39 (1977)). Given A, v^ + psi'delta has the weights delta ~ (delta^, C) of a regression filtered by A, and the next A
-//! is that of the expected products
+//! Of short logs the fit takes a part of v with it, that in the directions of psi: v^ = v - psi'(theta-hat - theta) has
+//! too little there, and the intervals were too short. For output errors A is that of v instead, by the restricted
+//! likelihood of Patterson and Thompson (Biometrika 58 (1971)), found by expectation and maximisation (Dempster, Laird
+//! and Rubin, J. Royal Statistical Society B 39 (1977)). Given A, v^ + psi'delta has the weights delta ~ (delta^, C) of
+//! a regression filtered by A, and the next A is that of the expected products
 //!
 //! ```text
 //! E v(t - k) v(t - l) = v~(t - k) v~(t - l) + psi(t - k)' C psi(t - l),   v~ = v^ - psi'delta^
@@ -23,9 +23,9 @@
 //!
 //! Where outputs are missing, A is found in the same way, their errors being among what is not known (see `holes`).
 //!
-//! sigma^2 is then as uncertain as a spectrum of few independent samples is: N/s of them, s = sum_k rho_k^2 over all lags (Bayley and
-//! Hammersley, J. Royal Statistical Society, Supplement 8 (1946)), where white errors have N. The covariance is as much larger as
-//! the variance of Student's distribution of these degrees of freedom.
+//! sigma^2 is then as uncertain as a spectrum of few independent samples is: N/s of them, s = sum_k rho_k^2 over all
+//! lags (Bayley and Hammersley, J. Royal Statistical Society, Supplement 8 (1946)), where white errors have N. The
+//! covariance is as much larger as the variance of Student's distribution of these degrees of freedom.
 
 mod holes;
 
@@ -48,7 +48,8 @@ pub(super) const HIGHEST: usize = 10;
 const ROWS: usize = 1024;
 /// From this many samples on, what the fit takes of v is nothing beside what is left.
 const MANY: usize = 20_000;
-/// How often expected products are formed; four digits of A stand after as many, or after twice as many where outputs are missing.
+/// How often expected products are formed; four digits of A stand after as many, or after twice as many where outputs
+/// are missing.
 const ROUNDS: usize = 6;
 /// The least degrees of freedom that Student's distribution is taken with.
 const FEWEST_DEGREES: f64 = 4.0;
@@ -70,14 +71,14 @@ impl Autoregression {
         self.monic.len() - 1
     }
 
-    /// S(0)/var v, the spectral density at frequency zero over its mean: by so much the mean of many v is less certain than that
-    /// of white noise.
+    /// S(0)/var v, the spectral density at frequency zero over its mean: by so much the mean of many v is less certain
+    /// than that of white noise.
     pub(super) fn at_zero(&self) -> f64 {
         1.0 / (self.monic.iter().sum::<f64>().powi(2) * power(&self.monic))
     }
 
-    /// By how much the variance of an estimate from `samples` is larger than that of white errors would be, `taken` degrees of
-    /// freedom being used, as their variance is less certain.
+    /// By how much the variance of an estimate from `samples` is larger than that of white errors would be, `taken`
+    /// degrees of freedom being used, as their variance is less certain.
     pub(super) fn inflation(&self, samples: usize, taken: usize) -> f64 {
         // sum rho_k^2 = int S^2/(int S)^2, the first that of 1/A^2.
         let spread = power(&product(&self.monic, &self.monic)) / power(&self.monic).powi(2);
@@ -180,8 +181,8 @@ fn highest_of(rows: impl Fn(usize) -> usize, [samples, known]: [usize; 2], taken
     (1..=HIGHEST).rev().find(enough).unwrap_or(0)
 }
 
-/// The order of the least MDL and its autoregression, from the normal equations of the highest over `rows`, `samples` errors being
-/// known.
+/// The order of the least MDL and its autoregression, from the normal equations of the highest over `rows`, `samples`
+/// errors being known.
 fn chosen(
     matrix: &DMatrix<f64>,
     right: DVector<f64>,
@@ -214,9 +215,10 @@ fn chosen(
     }
 }
 
-/// The autoregression of the errors v of which a fit has left `residuals` (see above), `psi` giving the derivatives of the fitted
-/// values, a list for each parameter, of the same samples. Residuals are NaN and psi is zero where an output is missing. For very
-/// many samples, or if they do not determine the parameters, that of the residuals. O(N n^2 p^2) for p parameters and n = 11 lags.
+/// The autoregression of the errors v of which a fit has left `residuals` (see above), `psi` giving the derivatives of
+/// the fitted values, a list for each parameter, of the same samples. Residuals are NaN and psi is zero where an output
+/// is missing. For very many samples, or if they do not determine the parameters, that of the residuals. O(N n^2 p^2)
+/// for p parameters and n = 11 lags.
 pub(super) fn restricted(
     residuals: &[f64],
     psi: impl FnOnce() -> Vec<Vec<f64>>,
@@ -314,8 +316,8 @@ pub(super) fn columns(
     combined.collect()
 }
 
-/// sum zeta zeta' over the samples from the first to the last of `runs`, where zeta = `combination` psi, zero outside the runs,
-/// filtered backwards in time by 1/A(q^+1):
+/// sum zeta zeta' over the samples from the first to the last of `runs`, where zeta = `combination` psi, zero outside
+/// the runs, filtered backwards in time by 1/A(q^+1):
 ///
 /// ```text
 /// zeta(t) = M psi(t) - a1 zeta(t + 1) - … - an zeta(t + n),   zeta = 0 after the last sample

@@ -86,7 +86,8 @@ pub struct VectorArxOptions {
     pub delay: RangeInclusive<usize>,
     /// Whether inputs act at once, so that the first of their coefficients is that of u(t).
     pub direct: bool,
-    /// Whether there is a constant in each equation; of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
+    /// Whether there is a constant in each equation; of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own
+    /// `constant` says it.
     pub constant: bool,
 }
 
@@ -129,8 +130,8 @@ pub struct VectorArxOutcome {
     pub coupling: Coupling,
     /// Whether the levels of the outputs were estimated with the coefficients; they are part of the outputs' offsets.
     pub constant: bool,
-    /// A_1, A_2, …, each with a row and a column for each output, with standard errors; without coupling, what is off the diagonal is zero and
-    /// has none.
+    /// A_1, A_2, …, each with a row and a column for each output, with standard errors; without coupling, what is off
+    /// the diagonal is zero and has none.
     pub a: Vec<Vec<Vec<Quantity>>>,
     /// For each input its coefficients, from its first effect on, each a list for the outputs.
     pub b: Vec<Vec<Vec<Quantity>>>,
@@ -161,17 +162,19 @@ pub(crate) struct VectorArxEstimate {
 /// y(t) + A_1 y(t-1) + … + A_na y(t-na) = B_0 u(t) + B_1 u(t-1) + … + c + e(t)
 /// ```
 ///
-/// with any number of outputs by least squares. The lagged products of all signals are the normal equations of every order and coupling; a
-/// Cholesky factor of some of them, with y(t) last, solves those of all outputs at once where these have the same regressors, and one after
-/// the other where each has its own past. Of several models that of the least
+/// with any number of outputs by least squares. The lagged products of all signals are the normal equations of every
+/// order and coupling; a Cholesky factor of some of them, with y(t) last, solves those of all outputs at once where
+/// these have the same regressors, and one after the other where each has its own past. Of several models that of the
+/// least
 ///
 /// ```text
 /// MDL = N ln det cov e + k ln N,   k coefficients
 /// ```
 ///
-/// is taken, all on the same rows; where inputs are later than asked, it is solved once more with them moved. With coupling the covariance of the coefficients is cov e (x) (Phi' Phi)^-1, without it of each output alone
-/// with e of outputs correlated as cov e says (Lütkepohl, New Introduction to Multiple Time Series Analysis, 2005, section 3.2). cov e has
-/// N less the regressors of an output in its denominator.
+/// is taken, all on the same rows; where inputs are later than asked, it is solved once more with them moved. With
+/// coupling the covariance of the coefficients is cov e (x) (Phi' Phi)^-1, without it of each output alone with e of
+/// outputs correlated as cov e says (Lütkepohl, New Introduction to Multiple Time Series Analysis, 2005, section 3.2).
+/// cov e has N less the regressors of an output in its denominator.
 ///
 /// The state space is the block observer form, y(t) = x_1(t) + B_0 u(t) + e(t) and
 ///
@@ -179,7 +182,8 @@ pub(crate) struct VectorArxEstimate {
 /// x_i(t+1) = x_{i+1}(t) - A_i x_1(t) + (B_i - A_i B_0) u(t) - A_i e(t)
 /// ```
 ///
-/// (Kailath, Linear Systems, 1980, section 6.4), which predicts as the regression does; its states are in units of the outputs' sizes.
+/// (Kailath, Linear Systems, 1980, section 6.4), which predicts as the regression does; its states are in units of the
+/// outputs' sizes.
 ///
 /// Cost: O(N q^2 p) for q signals and p lags once, then O((q p)^3) for each model.
 ///
@@ -198,8 +202,8 @@ pub(crate) fn vector_arx(
     of_products(products, |longest| record.samples(longest), record.channels(), options, sample_time)
 }
 
-/// The same where `products` gives those of so many lags of a record whose inputs are so many samples late, and `samples` how many of them
-/// have so many lags, of so many inputs and outputs.
+/// The same where `products` gives those of so many lags of a record whose inputs are so many samples late, and
+/// `samples` how many of them have so many lags, of so many inputs and outputs.
 fn of_products(
     products: impl Fn(usize, usize) -> Result<LaggedProducts, Error>,
     samples: impl Fn(usize) -> usize,
@@ -525,8 +529,8 @@ impl Solved {
         }
     }
 
-    /// Where outputs stay while inputs stay at zero: c of A(1) c = mean of A(q) y - B(q) u; none without a constant. Not finite where A(1) is
-    /// singular.
+    /// Where outputs stay while inputs stay at zero: c of A(1) c = mean of A(q) y - B(q) u; none without a constant.
+    /// Not finite where A(1) is singular.
     fn levels(&self, products: &LaggedProducts, a: &[DMatrix<f64>], b: &[DMatrix<f64>]) -> Option<Vec<f64>> {
         let means = products.means.as_ref()?;
         let (m, l, width) = (products.inputs, products.outputs, products.width());
@@ -640,8 +644,8 @@ impl Solved {
     }
 }
 
-/// The block observer form of coefficients by lag, from lag 0 on, states in units of the sizes of the outputs: else eigenvalues of signals of very
-/// different sizes lose their digits.
+/// The block observer form of coefficients by lag, from lag 0 on, states in units of the sizes of the outputs: else
+/// eigenvalues of signals of very different sizes lose their digits.
 fn observer_form(
     a: &[DMatrix<f64>],
     b: &[DMatrix<f64>],

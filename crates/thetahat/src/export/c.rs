@@ -6,7 +6,8 @@ use super::vector::Vector;
 use super::writer::Writer;
 use super::{ExportedFile, Language, Precision};
 
-/// gcc and clang tell by the first two names that every number is taken for finite, Microsoft's and Arm's compilers by the others.
+/// gcc and clang tell by the first two names that every number is taken for finite, Microsoft's and Arm's compilers by
+/// the others.
 const FINITE_MATH: &str = "
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__) || defined(_M_FP_FAST) || defined(__FP_FAST)
 #error \"A missing number is not finite, which is not seen with -ffast-math or -ffinite-math-only: compile this file without them.\"

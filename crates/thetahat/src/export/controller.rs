@@ -19,8 +19,8 @@ use super::{ExportedFile, Language, Plan};
 use crate::Error;
 use crate::control::Control;
 
-/// The numbers of a controller, in the letters of [`RstController`](thetahat_core::RstController): R and A_o without their leading 1, all
-/// as long as S, filled up with zeros.
+/// The numbers of a controller, in the letters of [`RstController`](thetahat_core::RstController): R and A_o without
+/// their leading 1, all as long as S, filled up with zeros.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Controller {
     /// t_0.

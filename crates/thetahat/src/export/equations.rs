@@ -4,7 +4,8 @@
 //! y(k) = h(x(k), u(k), t),   x(k+1) = f(x(k), u(k), t, dt)      or dx/dt = f, in steps of the classical method of order four (Kutta 1901)
 //! ```
 //!
-//! with the operations that the equations were compiled into. Predictors and observers correct the state by an extended Kalman filter.
+//! with the operations that the equations were compiled into. Predictors and observers correct the state by an extended
+//! Kalman filter.
 
 mod kalman;
 mod translation;
@@ -21,7 +22,8 @@ use translation::{Leaves, translated};
 /// The program of a model.
 ///
 /// # Errors
-/// [`Error::Model`] and [`Error::Report`] for equations that are none any more; [`Error::Argument`] for what such a model has not.
+/// [`Error::Model`] and [`Error::Report`] for equations that are none any more; [`Error::Argument`] for what such a
+/// model has not.
 pub(super) fn form(whole: &Model, model: &EquationsModel, purpose: Purpose) -> Result<Form, Error> {
     let is_corrected = match purpose {
         Purpose::Simulator => false,
@@ -80,8 +82,8 @@ struct Run<'e> {
     derivatives: Option<Derivatives>,
 }
 
-/// M = dx(k+1)/dx(k), row by row, and what its integration takes: the Jacobian of the equations, M at a stage, its derivative, and the sum of
-/// these.
+/// M = dx(k+1)/dx(k), row by row, and what its integration takes: the Jacobian of the equations, M at a stage, its
+/// derivative, and the sum of these.
 #[derive(Clone, Copy)]
 struct Derivatives {
     m: Array,
@@ -147,7 +149,8 @@ impl<'e> Run<'e> {
         program.repeat(self.inputs, |_, i| signals.hold_input(u, &i))
     }
 
-    /// So many results of the equations of the outputs: these, then their derivatives by the states, column after column.
+    /// So many results of the equations of the outputs: these, then their derivatives by the states, column after
+    /// column.
     fn observed(&self, program: &mut Program, count: usize) -> (Vec<Statement>, Vec<Value>) {
         let leaves = Leaves { states: self.x, inputs: self.u, time: self.time(None), step: 0.0 };
         translated(program, self.observation, count, &leaves)

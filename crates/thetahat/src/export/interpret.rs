@@ -29,8 +29,8 @@ struct Evaluation {
 }
 
 impl Machine {
-    /// At its start. In single precision every number and every result of an operation is rounded: that of two of these in double
-    /// precision has digits enough that rounding it twice is rounding it once (Figueroa 1995).
+    /// At its start. In single precision every number and every result of an operation is rounded: that of two of these
+    /// in double precision has digits enough that rounding it twice is rounding it once (Figueroa 1995).
     pub(super) fn new(program: &Program, precision: Precision) -> Self {
         let values = |values: &Vec<f64>| values.iter().map(|value| precision.rounded(*value)).collect();
         Self {

@@ -1,4 +1,5 @@
-//! The maps of nonlinear ARX models: as a constant of the core, which Rust evaluates, and in statements, which do the same in its order.
+//! The maps of nonlinear ARX models: as a constant of the core, which Rust evaluates, and in statements, which do the
+//! same in its order.
 
 use super::program::{
     Array, Basis, Condition, Evaluated, Field, Function, Index, Program, Statement, Value, Variable,

@@ -6,8 +6,8 @@
 //! e(t) = (D(q)/C(q)) w(t),   y^(t) = y(t) - e(t)
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, section 3.2), in the order of operations of [`respond`](crate::respond). The prediction is
-//! what e lacks of y(t), so that it is known before y(t) is.
+//! (Ljung, System Identification, 2nd ed. 1999, section 3.2), in the order of operations of
+//! [`respond`](crate::respond). The prediction is what e lacks of y(t), so that it is known before y(t) is.
 
 use super::program::{Array, Condition, Entry, Index, Program, Statement, Value, Variable};
 use super::signals::{FREE_RUN, PREDICTION, Signals, UPDATE};

@@ -1,13 +1,13 @@
-//! Processes in continuous time with held inputs, at their sample time T. With the dead time theta = m T - p, 0 <= p < T, and the chain of lags
-//! of an input,
+//! Processes in continuous time with held inputs, at their sample time T. With the dead time theta = m T - p, 0 <= p <
+//! T, and the chain of lags of an input,
 //!
 //! ```text
 //! c(t+1) = e^(A T) c(t) + int_0^T e^(A s) ds B u(t-m)
 //! y(t)   = sum of w'(C (e^(A p) c(t) + int_0^p e^(A s) ds B u(t-m)) + D u(t-m))
 //! ```
 //!
-//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3), exact at the samples. A process has been at rest with its
-//! first input before.
+//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3), exact at the samples. A process has
+//! been at rest with its first input before.
 
 use super::program::{Array, Condition, Program, Statement, Variable};
 use super::signals::Signals;

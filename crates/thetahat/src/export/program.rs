@@ -1,4 +1,5 @@
-//! A step of a model as a small program: numbers, arrays and loops of fixed length, from which every language is written.
+//! A step of a model as a small program: numbers, arrays and loops of fixed length, from which every language is
+//! written.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,6 +1,6 @@
-//! Recursive least squares, and their extension by C, that go on from a fit: types of the core, and what is theirs in its interface in C,
-//! started from the fit's parameters, its covariance over its noise variance, its noise variance and number of samples, as [`Tracker::from_report`](crate::track::Tracker::from_report)
-//! has it.
+//! Recursive least squares, and their extension by C, that go on from a fit: types of the core, and what is theirs in
+//! its interface in C, started from the fit's parameters, its covariance over its noise variance, its noise variance
+//! and number of samples, as [`Tracker::from_report`](crate::track::Tracker::from_report) has it.
 
 mod c;
 mod rust;
@@ -115,8 +115,8 @@ impl Start {
 /// The source, and with rows of a log what its errors are along them if nothing is forgotten.
 ///
 /// # Errors
-/// [`Error::Report`] for a model that cannot be tracked; [`Error::Argument`] for one that is larger than those of C; those of rows and
-/// channels.
+/// [`Error::Report`] for a model that cannot be tracked; [`Error::Argument`] for one that is larger than those of C;
+/// those of rows and channels.
 pub(super) fn exported(
     report: &Report,
     plan: &Plan,

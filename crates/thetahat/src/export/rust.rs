@@ -178,8 +178,8 @@ pub(super) fn check(program: &Program, name: &str, precision: Precision, vector:
     steps_along(name, precision, vector, ["", &steps], program.entries.iter().any(Entry::misses))
 }
 
-/// A program that takes these steps along a test vector, which leave the outputs of a row in `y`, and where they do count numbers that are missing
-/// in `missing`. What `new` gives is the model after `unwrapped`.
+/// A program that takes these steps along a test vector, which leave the outputs of a row in `y`, and where they do
+/// count numbers that are missing in `missing`. What `new` gives is the model after `unwrapped`.
 pub(super) fn steps_along(
     name: &str,
     precision: Precision,

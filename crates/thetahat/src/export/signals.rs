@@ -124,12 +124,14 @@ impl Signals {
         }
     }
 
-    /// Puts an input, as a deviation, into the last place of a line that moves on: where it is missing what stands there stays.
+    /// Puts an input, as a deviation, into the last place of a line that moves on: where it is missing what stands
+    /// there stays.
     pub(super) fn take_input(&self, program: &mut Program, place: usize, line: Array) -> Vec<Statement> {
         self.take(program, place, line, |deviation| deviation)
     }
 
-    /// The same of an input divided by its scale. Where it was taken before, for another line, it does not count again if it is missing.
+    /// The same of an input divided by its scale. Where it was taken before, for another line, it does not count again
+    /// if it is missing.
     pub(super) fn take_scaled(
         &self,
         program: &mut Program,
@@ -160,7 +162,8 @@ impl Signals {
         statements
     }
 
-    /// Puts an input, as a deviation, into its place among those that were held; where it is missing what stands there stays.
+    /// Puts an input, as a deviation, into its place among those that were held; where it is missing what stands there
+    /// stays.
     pub(super) fn hold_input(&self, held: Array, place: &Index) -> Vec<Statement> {
         let hold =
             |input: Array| hold(input.at(place.clone()), held, place.clone(), self.input(input, place));
@@ -176,7 +179,8 @@ impl Signals {
         }
     }
 
-    /// Puts what was measured of an output, as a deviation, into its place: where it is missing what stands there stays.
+    /// Puts what was measured of an output, as a deviation, into its place: where it is missing what stands there
+    /// stays.
     pub(super) fn hold_output(&self, held: Array, place: &Index) -> Statement {
         hold(self.measured.at(place.clone()), held, place.clone(), self.output(place))
     }

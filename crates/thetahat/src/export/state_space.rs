@@ -60,7 +60,8 @@ struct System {
     states: usize,
     inputs: usize,
     outputs: usize,
-    /// From the state, the inputs and the outputs to the next state; from the state and the inputs to the outputs. None is of no columns.
+    /// From the state, the inputs and the outputs to the next state; from the state and the inputs to the outputs. None
+    /// is of no columns.
     to_state: [Option<Array>; 3],
     to_output: [Option<Array>; 2],
     x: Option<Array>,
@@ -186,8 +187,9 @@ impl System {
         vec![signals.responds("predict", PREDICTION, predict), signals.updates(UPDATE, update)]
     }
 
-    /// What was measured, and the innovations: e, and where their covariance has an inverse their variances and e' S^-1 e, one output after the other,
-    /// the last one first, each less what those after it predict of it (S = U D U', Bierman 1977).
+    /// What was measured, and the innovations: e, and where their covariance has an inverse their variances and e' S^-1
+    /// e, one output after the other, the last one first, each less what those after it predict of it (S = U D U',
+    /// Bierman 1977).
     fn innovations(
         &self,
         program: &mut Program,

@@ -17,8 +17,8 @@ const LIBRARY: f64 = 1e-12;
 /// The set point of a controller stays as it is for so many rows.
 const HELD: usize = 25;
 
-/// What programs are given along rows of a log: a column for each input, for each output where these are needed, and for the set point of a
-/// controller.
+/// What programs are given along rows of a log: a column for each input, for each output where these are needed, and
+/// for the set point of a controller.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Columns {
     pub(super) inputs: Vec<Vec<f64>>,
@@ -67,8 +67,8 @@ impl Columns {
         })
     }
 
-    /// Those of a controller: what it measures, and the input that acted. A log has no set point: it goes between the highest and the lowest
-    /// measurement, so that it moves the input.
+    /// Those of a controller: what it measures, and the input that acted. A log has no set point: it goes between the
+    /// highest and the lowest measurement, so that it moves the input.
     ///
     /// # Errors
     /// As for [`new`](Self::new).
@@ -100,7 +100,8 @@ impl Columns {
         }
     }
 
-    /// These and what is expected as CSV: `u1`, `u2`, …, `y1`, …, `set_point1`, `expected1`, …; a missing value is empty.
+    /// These and what is expected as CSV: `u1`, `u2`, …, `y1`, …, `set_point1`, `expected1`, …; a missing value is
+    /// empty.
     pub(super) fn csv(&self, name: &str, expected: &[Vec<f64>]) -> ExportedFile {
         let named = |letter: &str, columns: &[Vec<f64>]| -> Vec<String> {
             (1..=columns.len()).map(|number| format!("{letter}{number}")).collect()

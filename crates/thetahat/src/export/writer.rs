@@ -200,7 +200,8 @@ impl<'p> Writer<'p> {
         self.program.variables.get(variable.0).map_or("", String::as_str)
     }
 
-    /// Whether the open block has this variable already: a loop of one turn stands in the block around it. Notes it else.
+    /// Whether the open block has this variable already: a loop of one turn stands in the block around it. Notes it
+    /// else.
     fn declares_again(&mut self, variable: Variable) -> bool {
         let Some(own) = self.declared.last_mut() else { return false };
         let again = own.contains(&variable);

@@ -19,11 +19,11 @@ pub struct StateEstimate<'a> {
     pub time: f64,
     /// The state given all rows before.
     pub predicted: StateValues<'a>,
-    /// The state given this row too. None from an observer: in predictor form a measurement corrects the state of the next
-    /// row.
+    /// The state given this row too. None from an observer: in predictor form a measurement corrects the state of the
+    /// next row.
     pub filtered: Option<StateValues<'a>>,
-    /// The unknown parameters, in their own units, given this row too. Empty if there are none. Their standard deviations are
-    /// those to first order, |dp/dz| times that of z.
+    /// The unknown parameters, in their own units, given this row too. Empty if there are none. Their standard
+    /// deviations are those to first order, |dp/dz| times that of z.
     pub parameters: StateValues<'a>,
     /// The outputs as predicted, with the standard deviations of the innovations.
     pub outputs: StateValues<'a>,
@@ -31,8 +31,8 @@ pub struct StateEstimate<'a> {
     pub innovations: &'a [f64],
     /// How many outputs of this row are there.
     pub measured: usize,
-    /// The normalised innovation squared: chi-square with `measured` degrees of freedom if the model is right. None if nothing
-    /// was measured, and from an observer.
+    /// The normalised innovation squared: chi-square with `measured` degrees of freedom if the model is right. None if
+    /// nothing was measured, and from an observer.
     pub nis: Option<f64>,
     /// Between which it lies in 95 % of the rows if the model is right.
     pub nis_bounds: Option<(f64, f64)>,

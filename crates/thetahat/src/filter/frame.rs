@@ -10,8 +10,9 @@ use crate::data::Offset;
 pub enum InitialState {
     /// It is 0: the plant is at rest, the channels at their offsets.
     Zero,
-    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the noise e. The lags of
-    /// a nonlinear ARX model are anywhere in the range of the rows that it was fitted to, half of which is their standard deviation.
+    /// Nothing: each state, which is in units of the output, has a standard deviation of a thousand times that of the
+    /// noise e. The lags of a nonlinear ARX model are anywhere in the range of the rows that it was fitted to, half of
+    /// which is their standard deviation.
     Unknown,
 }
 

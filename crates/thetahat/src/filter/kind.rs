@@ -186,8 +186,8 @@ impl Kind {
         Ok(())
     }
 
-    /// What the measurement of a row says. Before it is used, `show` is told the predicted outputs and H, which has a column
-    /// for each state and each unknown parameter.
+    /// What the measurement of a row says. Before it is used, `show` is told the predicted outputs and H, which has a
+    /// column for each state and each unknown parameter.
     pub(super) fn correct(
         &self,
         filter: &mut impl Recursion,

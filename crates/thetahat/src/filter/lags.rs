@@ -21,9 +21,9 @@ const LARGEST: usize = 500;
 /// y_m(k) = y(k) + v(k)                                     v ~ (0, R)
 /// ```
 ///
-/// The slopes of g are those of its map (Chen, Billings and Grant 1990 of networks), so that an extended Kalman filter has its F. Without v
-/// what is measured is the state, and the prediction is that one step ahead; where an output is missing it is the run from there on, with
-/// the covariance that grows with it.
+/// The slopes of g are those of its map (Chen, Billings and Grant 1990 of networks), so that an extended Kalman filter
+/// has its F. Without v what is measured is the state, and the prediction is that one step ahead; where an output is
+/// missing it is the run from there on, with the covariance that grows with it.
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
     /// Q: that of e where y(k) stands, else 0.

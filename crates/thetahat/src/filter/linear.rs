@@ -11,8 +11,8 @@ use crate::model::{PolynomialModel, Signal, StateSpace};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
-/// Prior variance of an unknown state, in units of the variance of e where it is seen. One row leaves a millionth of it: a smoother loses six
-/// digits, a filter none.
+/// Prior variance of an unknown state, in units of the variance of e where it is seen. One row leaves a millionth of
+/// it: a smoother loses six digits, a filter none.
 const UNKNOWN: f64 = 1e6;
 
 /// x(k+1) = F x(k) + G u(k) + w(k), with w ~ (0, Q) and cov(w, v) = S.
@@ -122,16 +122,16 @@ impl Linear {
 
     /// The transition after a row with these outputs there, and what drives it.
     ///
-    /// Where the noises are correlated, what is measured of v tells of w too. With S_M, R_M and H_M of the outputs that are
-    /// there and W = S_M R_M⁻¹,
+    /// Where the noises are correlated, what is measured of v tells of w too. With S_M, R_M and H_M of the outputs that
+    /// are there and W = S_M R_M⁻¹,
     ///
     /// ```text
     /// x(k+1) = (F - W H_M) x(k) + (G - W D_M) u(k) + W y_M(k) + w̄(k),      var w̄ = Q - W S_M'
     /// ```
     ///
-    /// in which w̄ and v_M are not correlated (Anderson and Moore, Optimal Filtering, 1979, section 5.5): so the time update
-    /// and the smoother are those of uncorrelated noises. The inputs of this transition are u and y one after the other. None
-    /// if the noises are not correlated, or nothing is there.
+    /// in which w̄ and v_M are not correlated (Anderson and Moore, Optimal Filtering, 1979, section 5.5): so the time
+    /// update and the smoother are those of uncorrelated noises. The inputs of this transition are u and y one after
+    /// the other. None if the noises are not correlated, or nothing is there.
     pub(super) fn after(
         &self,
         frame: &Frame,

@@ -15,8 +15,8 @@ use crate::model::GreyBox;
 ///     [   0      I   ]                                        [  0   Q_z ]
 /// ```
 ///
-/// A filter asks for function, Jacobian and noise one by one, each time at the same estimate. Computed together they share
-/// what they have in common.
+/// A filter asks for function, Jacobian and noise one by one, each time at the same estimate. Computed together they
+/// share what they have in common.
 #[derive(Debug, Clone)]
 pub(super) struct Linearization {
     pub(super) values: DVector<f64>,

@@ -9,8 +9,9 @@ use crate::report::Report;
 
 /// A model with a state, for a [`StateFilter`](super::StateFilter).
 ///
-/// It is a [`Report`] of a fit, in the form of [`PolynomialModel::state_space`](crate::model::PolynomialModel::state_space); or a TOML file with
-/// equations (see [`GreyBox`]), or with matrices:
+/// It is a [`Report`] of a fit, in the form of
+/// [`PolynomialModel::state_space`](crate::model::PolynomialModel::state_space); or a TOML file with equations (see
+/// [`GreyBox`]), or with matrices:
 ///
 /// ```text
 /// x(k+1) = F x(k) + G u(k) + w(k)          w ~ (0, Q), v ~ (0, R), cov(w, v) = S
@@ -28,7 +29,8 @@ use crate::report::Report;
 /// P0 = [[1e7]]
 /// ```
 ///
-/// and with G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x outputs).
+/// and with G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x
+/// outputs).
 #[derive(Debug, Clone)]
 pub struct StateModel {
     pub(super) kind: Kind,
@@ -77,12 +79,14 @@ impl StateModel {
         Ok(GreyBox::from_toml(text)?.into())
     }
 
-    /// The model of a report, from what `start` says, [`InitialState::Unknown`] without: polynomials and state space in innovations form; a nonlinear ARX
-    /// model with its lags as the state, as deviations from the offsets, of which an unknown start is anywhere in the range of the rows
-    /// that it was fitted to. Equations are as they are, with the values that were found, from the start that they say.
+    /// The model of a report, from what `start` says, [`InitialState::Unknown`] without: polynomials and state space in
+    /// innovations form; a nonlinear ARX model with its lags as the state, as deviations from the offsets, of which an
+    /// unknown start is anywhere in the range of the rows that it was fitted to. Equations are as they are, with the
+    /// values that were found, from the start that they say.
     ///
     /// # Errors
-    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for a start of equations.
+    /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for a start of
+    /// equations.
     pub fn from_report(report: &Report, start: Option<InitialState>) -> Result<Self, Error> {
         match &report.model {
             Model::Polynomial(model) => {
@@ -115,8 +119,9 @@ impl StateModel {
         }
     }
 
-    /// The same, and outputs that are measured with white noise of these standard deviations, in units of the outputs, beside the noise of
-    /// the report that drives the plant. A nonlinear ARX model measures its outputs exactly unless it is said; other models say theirs.
+    /// The same, and outputs that are measured with white noise of these standard deviations, in units of the outputs,
+    /// beside the noise of the report that drives the plant. A nonlinear ARX model measures its outputs exactly unless
+    /// it is said; other models say theirs.
     ///
     /// # Errors
     /// [`Error::Argument`] for another model, another number of outputs, or what is no deviation.
@@ -173,8 +178,8 @@ impl StateModel {
         parameters.iter().map(|parameter| parameter.name.as_str())
     }
 
-    /// How the unknown parameters are kept within their bounds, in words, such as `mass = 0.1 + exp(z)`; none for one without
-    /// bounds.
+    /// How the unknown parameters are kept within their bounds, in words, such as `mass = 0.1 + exp(z)`; none for one
+    /// without bounds.
     pub fn changes_of_variable(&self) -> impl ExactSizeIterator<Item = Option<String>> {
         let parameters = match &self.kind {
             Kind::Sampled(..) => &[],
@@ -191,8 +196,8 @@ impl StateModel {
         }
     }
 
-    /// Whether it is linear in its state and has no unknown parameters, so that [`Estimator::Kalman`](super::Estimator::Kalman)
-    /// is exact.
+    /// Whether it is linear in its state and has no unknown parameters, so that
+    /// [`Estimator::Kalman`](super::Estimator::Kalman) is exact.
     pub fn is_linear(&self) -> bool {
         match &self.kind {
             Kind::Sampled(_, motion) => matches!(motion, Motion::Linear(_)),

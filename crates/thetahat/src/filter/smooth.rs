@@ -37,9 +37,9 @@ impl SmoothedStates {
 impl StateFilter {
     /// The states of all rows since [`recording`](StateFilter::recording), each given all of them.
     ///
-    /// The rows are filtered once more by a fixed-interval smoother, see [`Smoother`]. With a model that is not linear it
-    /// smooths with the filter's linearisations. Memory: 2 N² + N numbers for each sample, N being the number of states and
-    /// unknown parameters.
+    /// The rows are filtered once more by a fixed-interval smoother, see [`Smoother`]. With a model that is not linear
+    /// it smooths with the filter's linearisations. Memory: 2 N² + N numbers for each sample, N being the number of
+    /// states and unknown parameters.
     ///
     /// # Errors
     /// [`Error::Argument`] if the rows were not recorded from the first one on, or the estimator is an observer;

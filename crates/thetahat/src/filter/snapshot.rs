@@ -12,8 +12,8 @@ use crate::Error;
 
 /// Where a [`StateFilter`] stands, without its model: plain data, to be kept with serde.
 ///
-/// A filter of the same model and estimator that [resumes](StateFilter::resumed) from it goes on to the bit. Rows that are
-/// [recorded](StateFilter::recording) are not part of it.
+/// A filter of the same model and estimator that [resumes](StateFilter::resumed) from it goes on to the bit. Rows that
+/// are [recorded](StateFilter::recording) are not part of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct FilterSnapshot {
     estimator: String,

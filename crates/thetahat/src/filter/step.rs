@@ -17,20 +17,20 @@ use crate::data::Offset;
 /// later rows    predict over the step from the row before, with that row's u; then correct with y(k) and u(k)
 /// ```
 ///
-/// Inputs are held from their row to the next. A NaN among the outputs is a missing element, which is skipped alone. A NaN
-/// among the inputs is replaced by that input's last value, and before the first one by its offset, which is zero but for
-/// reports.
+/// Inputs are held from their row to the next. A NaN among the outputs is a missing element, which is skipped alone. A
+/// NaN among the inputs is replaced by that input's last value, and before the first one by its offset, which is zero
+/// but for reports.
 ///
-/// **Steps.** A model in equations with `dt` or `[derivative]` takes steps of any length. Any other takes whole multiples of
-/// its sample time, within 1 %: it predicts as many times.
+/// **Steps.** A model in equations with `dt` or `[derivative]` takes steps of any length. Any other takes whole
+/// multiples of its sample time, within 1 %: it predicts as many times.
 ///
-/// **Filters.** Where the noises are correlated, as in a report's innovations form, what a measurement tells of the process
-/// noise is used in the prediction after it. The covariance is kept factored: see
+/// **Filters.** Where the noises are correlated, as in a report's innovations form, what a measurement tells of the
+/// process noise is used in the prediction after it. The covariance is kept factored: see
 /// [`ExtendedKalmanFilter`](thetahat_core::ExtendedKalmanFilter).
 ///
-/// **Observer.** In predictor form a row's measurement corrects the state of the next row: there is no filtered state, and
-/// no noise, standard deviation or normalised innovation squared. Over a step of several sample times the measurement
-/// counts in the first of them.
+/// **Observer.** In predictor form a row's measurement corrects the state of the next row: there is no filtered state,
+/// and no noise, standard deviation or normalised innovation squared. Over a step of several sample times the
+/// measurement counts in the first of them.
 ///
 /// ```
 /// use thetahat::filter::{Estimator, StateFilter, StateModel};
@@ -140,15 +140,16 @@ impl StateFilter {
         self.history.as_deref()
     }
 
-    /// Takes a row: its inputs and outputs in the order of the model's channels, NaN where one is missing, and the seconds
-    /// since the row before; none: one sample time. They do not count for the first row.
+    /// Takes a row: its inputs and outputs in the order of the model's channels, NaN where one is missing, and the
+    /// seconds since the row before; none: one sample time. They do not count for the first row.
     ///
     /// The model's functions and their derivatives, and the cost of the filter's
-    /// [`predict`](thetahat_core::ExtendedKalmanFilter::predict) and [`correct`](thetahat_core::ExtendedKalmanFilter::correct).
+    /// [`predict`](thetahat_core::ExtendedKalmanFilter::predict) and
+    /// [`correct`](thetahat_core::ExtendedKalmanFilter::correct).
     ///
     /// # Errors
-    /// After which nothing has changed: [`Error::Data`] if a value is infinite, the step does not fit the model, or the model
-    /// or the filter has no finite answer; [`Error::Argument`] for another number of inputs or outputs.
+    /// After which nothing has changed: [`Error::Data`] if a value is infinite, the step does not fit the model, or the
+    /// model or the filter has no finite answer; [`Error::Argument`] for another number of inputs or outputs.
     pub fn step(
         &mut self,
         step_seconds: Option<f64>,

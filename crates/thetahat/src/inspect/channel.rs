@@ -11,7 +11,8 @@ use crate::data::{Channel, Log, Rows, Times};
 const ANSWERS: usize = 10;
 /// And that so many lie so near has at most this probability where there is nothing in it.
 const CHANCE: f64 = 0.01;
-/// Of jumps near which no more than this part of all rows lies, each outlier near one is an answer, whatever chance says: a single blow.
+/// Of jumps near which no more than this part of all rows lies, each outlier near one is an answer, whatever chance
+/// says: a single blow.
 const SELDOM: f64 = 0.2;
 /// A jump is this part of the largest change, and so many times what nine of ten changes are.
 const LARGE: f64 = 0.5;
@@ -39,8 +40,8 @@ pub(super) fn explain(quality: &mut ChannelQuality, all: &[usize], jumps: &[usiz
     quality.outliers = left.into_iter().take(NAMED).collect();
 }
 
-/// The outliers (rows from 1) that other channels do not explain, by the rows (0-based, sorted) at which these jump: all, but for those near
-/// jumps where jumps are seldom, or more lie there than chance brings once in a hundred times.
+/// The outliers (rows from 1) that other channels do not explain, by the rows (0-based, sorted) at which these jump:
+/// all, but for those near jumps where jumps are seldom, or more lie there than chance brings once in a hundred times.
 fn unexplained(all: &[usize], jumps: &[usize], rows: usize) -> Vec<usize> {
     let near = |row: usize| {
         let next = jumps.partition_point(|jump| jump + ANSWERS < row);
@@ -83,8 +84,8 @@ const STUCK: usize = 20;
 /// And so many times the longest other one.
 const ALONE: usize = 4;
 
-/// The rows of the longest run of equal values inside of a log, where no other one comes near it and the channel moves otherwise: one that
-/// goes from level to level, or is at rest to its rounding, has more of them.
+/// The rows of the longest run of equal values inside of a log, where no other one comes near it and the channel moves
+/// otherwise: one that goes from level to level, or is at rest to its rounding, has more of them.
 fn stuck(values: &[f64]) -> Option<Rows> {
     let (mut row, mut longest, mut second, mut repeated) = (0, 0..0, 0, 0);
     for run in values.chunk_by(|left, right| left == right) {
@@ -106,7 +107,8 @@ fn stuck(values: &[f64]) -> Option<Rows> {
     (inside && alone && moves).then(|| Rows::from_positions(&longest))
 }
 
-/// Looks at the values of a channel as they are; also all rows (1-based) of its outliers. O(N log N); up to 32 bytes for each value besides the values themselves.
+/// Looks at the values of a channel as they are; also all rows (1-based) of its outliers. O(N log N); up to 32 bytes
+/// for each value besides the values themselves.
 pub(super) fn quality(channel: &Channel, role: Option<&str>, times: &Times) -> (ChannelQuality, Vec<usize>) {
     let all = &channel.values;
     // Where nothing is missing, the values serve as they are.

@@ -23,12 +23,13 @@ pub(super) struct Ticks {
 }
 
 impl Ticks {
-    /// The steps as [`Log::with_time`](crate::data::Log::with_time) takes them: over 1.5 medians there is a gap; another step
-    /// more than 10 % off the median makes the clock irregular. The median is that of the steps that go forward. O(N).
+    /// The steps as [`Log::with_time`](crate::data::Log::with_time) takes them: over 1.5 medians there is a gap;
+    /// another step more than 10 % off the median makes the clock irregular. The median is that of the steps that go
+    /// forward. O(N).
     ///
     /// # Errors
-    /// [`Error::Argument`] for a sample time that is not positive; [`Error::Data`] for times that are not one for each row,
-    /// not finite, or never advance.
+    /// [`Error::Argument`] for a sample time that is not positive; [`Error::Data`] for times that are not one for each
+    /// row, not finite, or never advance.
     pub(super) fn new(times: &Times, rows: usize) -> Result<Self, Error> {
         let time = match times {
             Times::Uniform(step) if step.is_finite() && *step > 0.0 => {

@@ -25,8 +25,8 @@ const ROUNDING: f64 = 1e-8;
 /// Half the width of the band that holds 95 % of a standard normal variable.
 const BAND: f64 = 1.959_963_984_540_054;
 
-/// Puts in the delays of all inputs together, as a fit without orders finds them: see `select::delay`. Inputs that never change
-/// have none; `follows` says which follow the output.
+/// Puts in the delays of all inputs together, as a fit without orders finds them: see `select::delay`. Inputs that
+/// never change have none; `follows` says which follow the output.
 ///
 /// The signals are deviations.
 pub(super) fn estimate(
@@ -62,8 +62,8 @@ pub(super) fn estimate(
     Ok(())
 }
 
-/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried. O(M^3) for M
-/// lags of all of them.
+/// Puts in the impulse responses of the inputs of a record, in units of its signals, as far as the highest lag tried.
+/// O(M^3) for M lags of all of them.
 pub(super) fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Record<'_>) {
     let end = record.output.len().min(RESPONSE_ROWS);
     let within = record.segments.iter().map(|segment| segment.start..segment.end.min(end));
@@ -98,17 +98,17 @@ pub(super) fn respond(found: &mut [DelayEstimate], moving: &[usize], record: &Re
 /// a(t) = A_u(q) u(t),   b(t) = A_y(q) y(t),   r(k) = sum a(t - k) b(t) / sqrt(sum a^2 sum b^2)
 /// ```
 ///
-/// with autoregressions A_u of the input and A_y of the output. Box and Jenkins (Time Series Analysis, 1976, section 11.2) filter
-/// both by A_u, which leaves b as slow as the output is and its correlations small; with a filter each
-/// (Haugh, JASA 71, 1976) b is the output's own innovation. Neither filter moves the first lag at which there is an effect, as
-/// both are monic in q^-1: b = A_y/A_u B/F a + noise, which begins at q^-nk.
+/// with autoregressions A_u of the input and A_y of the output. Box and Jenkins (Time Series Analysis, 1976, section
+/// 11.2) filter both by A_u, which leaves b as slow as the output is and its correlations small; with a filter each
+/// (Haugh, JASA 71, 1976) b is the output's own innovation. Neither filter moves the first lag at which there is an
+/// effect, as both are monic in q^-1: b = A_y/A_u B/F a + noise, which begins at q^-nk.
 ///
-/// As a is white, r(k) has the variance 1/N at lags before the delay, whatever the noise (Bartlett's formula: its sum over
-/// the products of both autocorrelations has one term left). So it has at negative lags, where the input comes after the output, unless
-/// it follows the output. O(N M).
+/// As a is white, r(k) has the variance 1/N at lags before the delay, whatever the noise (Bartlett's formula: its sum
+/// over the products of both autocorrelations has one term left). So it has at negative lags, where the input comes
+/// after the output, unless it follows the output. O(N M).
 ///
-/// The signals are deviations, zero outside of the segments. The delay itself is left open: the first correlation that stands out
-/// is often too late where the input is slow.
+/// The signals are deviations, zero outside of the segments. The delay itself is left open: the first correlation that
+/// stands out is often too late where the input is slow.
 pub(super) fn correlation(
     name: &str,
     input: &[f64],

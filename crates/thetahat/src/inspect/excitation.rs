@@ -25,21 +25,21 @@ pub(super) const SAME: f64 = 1e-20;
 /// The mean squares of signals that are the same differ by less than this fraction.
 const ALIKE: f64 = 1e-6;
 
-/// The order of persistence of excitation (Ljung, System Identification, 2nd ed. 1999, section 13.2; Söderström and Stoica, System
-/// Identification, 1989, section 5.4): the rank of the covariance matrix of
+/// The order of persistence of excitation (Ljung, System Identification, 2nd ed. 1999, section 13.2; Söderström and
+/// Stoica, System Identification, 1989, section 5.4): the rank of the covariance matrix of
 ///
 /// ```text
 /// [u(t), u(t - 1), …, u(t - n + 1)],
 /// ```
 ///
-/// each lag less its mean, n = 50, or less of a short log. The mean is removed, as a fit removes it: a constant has order 0, a sum of k
-/// sinusoids 2k, white noise n. Of a finite record the matrix is the sum over the samples that have all their lags, without
-/// zeros in place of others, so that a sinusoid has rank 2 to rounding.
+/// each lag less its mean, n = 50, or less of a short log. The mean is removed, as a fit removes it: a constant has
+/// order 0, a sum of k sinusoids 2k, white noise n. Of a finite record the matrix is the sum over the samples that have
+/// all their lags, without zeros in place of others, so that a sinusoid has rank 2 to rounding.
 ///
-/// Eigenvalues above 1e-6 of the largest count: below lies what rounding to three digits leaves (a direction excited at a
-/// thousandth of the amplitude of the strongest), above is all of a first-order process with a pole at 0.999 sampled as
-/// often as that. Nor is the order above the number of times that the input changes: each step of a
-/// step test is seen once, and to excite persistently is to do so over and over. O(N n + n^3).
+/// Eigenvalues above 1e-6 of the largest count: below lies what rounding to three digits leaves (a direction excited at
+/// a thousandth of the amplitude of the strongest), above is all of a first-order process with a pole at 0.999 sampled
+/// as often as that. Nor is the order above the number of times that the input changes: each step of a step test is
+/// seen once, and to excite persistently is to do so over and over. O(N n + n^3).
 pub(crate) fn excitation(
     name: &str,
     values: &[f64],
@@ -63,8 +63,8 @@ pub(crate) fn excitation(
     }
 }
 
-/// Whether a signal is a sum of a few sinusoids, about its mean: then it shows the response at their frequencies, and nothing of
-/// that at rest, nor of delays. A signal of few changes is that of a step test, and none.
+/// Whether a signal is a sum of a few sinusoids, about its mean: then it shows the response at their frequencies, and
+/// nothing of that at rest, nor of delays. A signal of few changes is that of a step test, and none.
 pub(crate) fn is_few_sinusoids(values: &[f64], segments: &[Range<usize>]) -> bool {
     let pairs = || segments.iter().flat_map(|segment| values[segment.clone()].windows(2));
     let changes = pairs().filter(|pair| pair[0] != pair[1]).count();
@@ -76,8 +76,8 @@ pub(crate) fn is_few_sinusoids(values: &[f64], segments: &[Range<usize>]) -> boo
     (1..=SINUSOIDS).contains(&order)
 }
 
-/// Inputs that are the same as an earlier one but for scale and offset, each with the first such one. `segments` gives those in
-/// which none of some signals misses a value.
+/// Inputs that are the same as an earlier one but for scale and offset, each with the first such one. `segments` gives
+/// those in which none of some signals misses a value.
 ///
 /// Of the same rows they have the same mean square in units of the largest deviation. So no more are compared than have
 /// about the same, or miss values. O(M N + M log M) for M inputs, if few are alike.
@@ -142,11 +142,11 @@ fn unit<I: Iterator<Item = f64>>(values: impl Fn() -> I) -> f64 {
     values().fold(0.0, |largest: f64, value| largest.max((value - mean).abs()))
 }
 
-/// The order of persistence of excitation as textbooks count it, the mean being a part of the signal: a constant has order 1, a
-/// sinusoid 2, both together 3; and the highest order tried. Else as [`excitation`].
+/// The order of persistence of excitation as textbooks count it, the mean being a part of the signal: a constant has
+/// order 1, a sinusoid 2, both together 3; and the highest order tried. Else as [`excitation`].
 ///
-/// A mean above the largest deviation counts as if it were that: the order does not depend on how large it is, and beside a larger
-/// one the deviations would be rounding.
+/// A mean above the largest deviation counts as if it were that: the order does not depend on how large it is, and
+/// beside a larger one the deviations would be rounding.
 pub(crate) fn order_with_mean(values: &[f64]) -> (usize, usize) {
     let all = 0..values.len();
     let segments = slice::from_ref(&all);

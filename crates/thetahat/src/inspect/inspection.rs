@@ -32,8 +32,8 @@ pub struct Inspection {
     pub delays: Vec<DelayEstimate>,
     /// One entry for each input.
     pub feedback: Vec<Feedback>,
-    /// How many rows a step test is at rest before its first step: no input changes, and the output hardly does. None for other
-    /// logs.
+    /// How many rows a step test is at rest before its first step: no input changes, and the output hardly does. None
+    /// for other logs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rest: Option<usize>,
     /// The command that would fit a model to it; none without an output.
@@ -182,14 +182,15 @@ pub struct DelayEstimate {
     pub confidence: Option<f64>,
     /// The correlation of the output with the input before it, both prewhitened, at lags 0, 1, …
     pub correlation: Vec<f64>,
-    /// The correlation of the input with the output before it at lags 1, 2, …: none for an input that does not follow the output.
+    /// The correlation of the input with the output before it at lags 1, 2, …: none for an input that does not follow
+    /// the output.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub following: Vec<f64>,
     /// Half the width of the 95 % band of both.
     pub band: f64,
-    /// The impulse response at lags 0, 1, … in units of the output for one of the input: that of all inputs together by regularised
-    /// least squares with the kernel DC (Chen, Ohlsson and Ljung 2012), over the first 20,000 rows. Empty where there are too few rows,
-    /// or more than 200 values of all inputs.
+    /// The impulse response at lags 0, 1, … in units of the output for one of the input: that of all inputs together by
+    /// regularised least squares with the kernel DC (Chen, Ohlsson and Ljung 2012), over the first 20,000 rows. Empty
+    /// where there are too few rows, or more than 200 values of all inputs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub impulse_response: Vec<f64>,
     /// Its standard errors, for white noise.
@@ -229,8 +230,8 @@ impl DelayEstimate {
 pub struct Feedback {
     /// The input channel.
     pub input: String,
-    /// How often past errors of the output help as much to predict an input that does not follow it; none where it cannot be
-    /// said.
+    /// How often past errors of the output help as much to predict an input that does not follow it; none where it
+    /// cannot be said.
     pub p_value: Option<f64>,
     /// The fraction of what is new in the input that they predict on rows left out; negative where they mislead.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -330,9 +331,9 @@ impl Inspection {
         }
     }
 
-    /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before the inputs,
-    /// these before the others, and among them those first with the most to say of. Findings are cut to as many. A log of
-    /// up to twice as many channels, or findings, keeps all of them. O(M log M) for M channels.
+    /// The same about the channels that matter most, `most` at most, in the order of the log: the output comes before
+    /// the inputs, these before the others, and among them those first with the most to say of. Findings are cut to as
+    /// many. A log of up to twice as many channels, or findings, keeps all of them. O(M log M) for M channels.
     pub fn brief(&self, most: usize) -> Self {
         let role = |channel: &ChannelQuality| match channel.role.as_deref() {
             Some("output") => 2,

@@ -64,7 +64,8 @@ pub(super) fn line(time: impl Fn(usize) -> f64, values: &[f64]) -> Option<(f64, 
     Some((slope / span, (slope * product / square).min(1.0)))
 }
 
-/// What one unit of a signal's deviations is in its own units: the ratio of their ranges. None where it does not change.
+/// What one unit of a signal's deviations is in its own units: the ratio of their ranges. None where it does not
+/// change.
 pub(super) fn unit(values: &[f64], deviations: &[f64], segments: &[Range<usize>]) -> Option<f64> {
     let range = |signal: &[f64]| {
         let inside = || segments.iter().flat_map(|segment| &signal[segment.clone()]);
@@ -73,8 +74,8 @@ pub(super) fn unit(values: &[f64], deviations: &[f64], segments: &[Range<usize>]
     Some(range(values) / range(deviations)).filter(|unit| unit.is_normal())
 }
 
-/// A signal's deviations from its mean over the segments, as fractions of the largest; zero outside of them, and everywhere
-/// if it is constant to rounding.
+/// A signal's deviations from its mean over the segments, as fractions of the largest; zero outside of them, and
+/// everywhere if it is constant to rounding.
 pub(super) fn deviations(values: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     let inside = || segments.iter().flat_map(|segment| values[segment.clone()].iter().copied());
     let scale = scale(inside());

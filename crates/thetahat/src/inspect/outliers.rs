@@ -16,13 +16,14 @@ pub(super) const NORMAL_SIZE: f64 = 2.326_347_874_040_841;
 ///
 /// This is Hampel's filter (Hampel 1974; Pearson 2002) with one scale for the whole signal, the larger of
 ///
-/// - the distance to the median that 2 % exceed, over 2.326: the standard deviation of normal distances. The median of all
-///   distances, which Hampel takes, would call short pulses of an input outliers: what happens so often is the signal;
+/// - the distance to the median that 2 % exceed, over 2.326: the standard deviation of normal distances. The median of
+///   all distances, which Hampel takes, would call short pulses of an input outliers: what happens so often is the
+///   signal;
 /// - the median change from one value to the next, where they change at all: a stepped or rounded signal moves so far.
 ///
-/// The median of seven follows a step without delay, so edges are not outliers. A signal with other jumps as large goes from level to
-/// level: of that, a value between its largest and smallest other ones is a short stay at a level and no outlier.
-/// Normal noise reaches 8 deviations once in 10^15 values. O(N). The values have sizes near 1 or below.
+/// The median of seven follows a step without delay, so edges are not outliers. A signal with other jumps as large goes
+/// from level to level: of that, a value between its largest and smallest other ones is a short stay at a level and no
+/// outlier. Normal noise reaches 8 deviations once in 10^15 values. O(N). The values have sizes near 1 or below.
 pub(super) fn outliers(values: &[f64]) -> Vec<usize> {
     if values.len() < FEWEST {
         return Vec::new();

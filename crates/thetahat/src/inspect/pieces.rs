@@ -24,32 +24,33 @@ use dynamics::Dynamics;
 /// The median step of the first part and that of the whole log differ by less than this fraction.
 const SAME_STEP: f64 = 0.01;
 
-/// An inspection of a log of any length, of which the parts are given one after the other: memory does not grow with the rows.
+/// An inspection of a log of any length, of which the parts are given one after the other: memory does not grow with
+/// the rows.
 ///
-/// A log of one part is inspected as [`inspect()`](super::inspect()) does. Of several parts each figure is a sum that adds up over
-/// them, the borders included:
+/// A log of one part is inspected as [`inspect()`](super::inspect()) does. Of several parts each figure is a sum that
+/// adds up over them, the borders included:
 ///
-/// - exact to rounding: rows, clock (gaps, the first row at which time goes back), and of each channel what is missing, its range, mean,
-///   standard deviation, trend, repeated values, holds, saturation; of each input its changes, order of excitation, spectrum, and whether
-///   it is the same as another one.
-/// - from the moments of lagged signals up to lag 112: delays, with a constant in all models, and prewhitened correlations. Of each
-///   segment they leave out as many first samples.
-/// - from counts of values: the median step is exact while there are no more than 65,536 different ones; beyond that it has a relative
-///   error of 2^-10 at most, in practice. The limit of outliers follows from two quantiles of such counts; of more than 16,384 outliers
-///   the farthest are counted. What a channel is rounded to is told of up to 65,536 different values. (Of more than 16 channels these
-///   numbers are less, down to a sixteenth.)
+/// - exact to rounding: rows, clock (gaps, the first row at which time goes back), and of each channel what is missing,
+///   its range, mean, standard deviation, trend, repeated values, holds, saturation; of each input its changes, order
+///   of excitation, spectrum, and whether it is the same as another one.
+/// - from the moments of lagged signals up to lag 112: delays, with a constant in all models, and prewhitened
+///   correlations. Of each segment they leave out as many first samples.
+/// - from counts of values: the median step is exact while there are no more than 65,536 different ones; beyond that it
+///   has a relative error of 2^-10 at most, in practice. The limit of outliers follows from two quantiles of such
+///   counts; of more than 16,384 outliers the farthest are counted. What a channel is rounded to is told of up to
+///   65,536 different values. (Of more than 16 channels these numbers are less, down to a sixteenth.)
 /// - of the first 100,000 rows, or of the first part if it has fewer: feedback, impulse responses.
-/// - left out: whether a step test begins at rest, delays where there are more than seven inputs or the sums lack the digits, and
-///   excitation, delays and feedback where the clock is irregular or goes back: the log is not resampled.
+/// - left out: whether a step test begins at rest, delays where there are more than seven inputs or the sums lack the
+///   digits, and excitation, delays and feedback where the clock is irregular or goes back: the log is not resampled.
 ///
-/// The findings of the document name what is left out, and what is of the first rows. Gaps are told by the median step of the first part; where
-/// the whole log has another one, what depends on it is left out.
+/// The findings of the document name what is left out, and what is of the first rows. Gaps are told by the median step
+/// of the first part; where the whole log has another one, what depends on it is left out.
 ///
-/// Cost: O(N (log L + q^2 L)) for N rows, q inputs and outputs and L = 112; the memory of a part, 4 MB for each channel (0.3 MB of more
-/// than 256), and some 30 MB for the lags of eight signals.
+/// Cost: O(N (log L + q^2 L)) for N rows, q inputs and outputs and L = 112; the memory of a part, 4 MB for each channel
+/// (0.3 MB of more than 256), and some 30 MB for the lags of eight signals.
 ///
-/// Source: the sums are those of `regression::lagged_moments` (Chan, Golub and LeVeque 1983), the counts those of Epicoco et al. (IEEE Access 8,
-/// 2020).
+/// Source: the sums are those of `regression::lagged_moments` (Chan, Golub and LeVeque 1983), the counts those of
+/// Epicoco et al. (IEEE Access 8, 2020).
 ///
 /// ```
 /// use thetahat::data::{Channel, Recording, Rows, Source, Times};
@@ -119,8 +120,8 @@ impl PiecewiseInspection {
     /// Adds the next rows.
     ///
     /// # Errors
-    /// As for [`inspect()`](super::inspect()), with the row of this part; [`Error::Data`] if a part has other channels than the first, or
-    /// another kind of clock. Nothing has changed then.
+    /// As for [`inspect()`](super::inspect()), with the row of this part; [`Error::Data`] if a part has other channels
+    /// than the first, or another kind of clock. Nothing has changed then.
     pub fn add(&mut self, part: Recording) -> Result<(), Error> {
         let rows = check(&part.channels)?;
         if let Times::Measured(time) = &part.times

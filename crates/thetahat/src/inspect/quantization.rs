@@ -14,10 +14,10 @@ const CLEAR: f64 = 10.0;
 /// The step of which the differences of all values are multiples; `distinct` in rising order.
 ///
 /// First a step coarser than the printed decimals is searched for, such as 10/4095 printed with seven: an approximate
-/// greatest common divisor of the differences between neighbours (Euclid's algorithm with the tolerance of printing), which is
-/// then improved over the whole range and verified on every value. Failing that, it is the greatest common divisor of the
-/// values in units of their last printed place. None where there are fewer than eight different values, or the step is
-/// more than an eighth or less than 2^-24 of the range. O(N).
+/// greatest common divisor of the differences between neighbours (Euclid's algorithm with the tolerance of printing),
+/// which is then improved over the whole range and verified on every value. Failing that, it is the greatest common
+/// divisor of the values in units of their last printed place. None where there are fewer than eight different values,
+/// or the step is more than an eighth or less than 2^-24 of the range. O(N).
 pub(crate) fn quantization(distinct: &[f64]) -> Option<f64> {
     let (&first, &last) = distinct.first().zip(distinct.last())?;
     let range = last - first;

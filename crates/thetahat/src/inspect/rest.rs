@@ -6,14 +6,15 @@ use std::ops::Range;
 pub(super) const FEW_CHANGES: usize = 5;
 /// And it moves in no more than this part of the rows: a step may take several, noise moves in all of them.
 pub(super) const MOVES: f64 = 0.25;
-/// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by: the
-/// difference between the means of the first and the second half.
+/// At rest the standard deviation of an output is no more than this part of its range, and neither is what it moves by:
+/// the difference between the means of the first and the second half.
 const STAYS: f64 = 0.05;
 /// Fewer rows do not show that the output stays.
 const FEWEST: usize = 5;
 
-/// How many first rows a step test is at rest: all inputs hold their first value, and so does the output but for noise. None where it is no step test, that is if an input changes more than five times or none changes at all, or if
-/// that is not seen in five rows. O(N).
+/// How many first rows a step test is at rest: all inputs hold their first value, and so does the output but for noise.
+/// None where it is no step test, that is if an input changes more than five times or none changes at all, or if that
+/// is not seen in five rows. O(N).
 pub(super) fn rest(inputs: &[&[f64]], output: &[f64], segments: &[Range<usize>]) -> Option<usize> {
     let first = segments.first()?;
     let changes = |input: &[f64]| segments.iter().map(|rows| changes(&input[rows.clone()])).sum::<usize>();

@@ -2,9 +2,9 @@ use super::Inspection;
 use crate::{Cell, Row};
 
 impl Inspection {
-    /// What a table of many inspections says of this one: its rows and clock, of each channel its mean, its standard deviation and how
-    /// much is missing or far off, and of each input how much it excites, its delay and whether it follows the output. Cells
-    /// without a value are left out; names end with that of the channel.
+    /// What a table of many inspections says of this one: its rows and clock, of each channel its mean, its standard
+    /// deviation and how much is missing or far off, and of each input how much it excites, its delay and whether it
+    /// follows the output. Cells without a value are left out; names end with that of the channel.
     pub fn row(&self) -> Row {
         let mut row = Row::default();
         row.count("rows", self.rows);

@@ -20,19 +20,19 @@ pub(super) const BACKWARD: &str =
     "excitation, delay and feedback are left out, as the time does not run forward";
 pub(super) const IRREGULAR: &str = "excitation, delay and feedback are left out, as the log is not uniform";
 
-/// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their delays,
-/// and whether they follow the output.
+/// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their
+/// delays, and whether they follow the output.
 ///
-/// Clock and quality are those of the rows as they are. Excitation, delay and feedback are of the log as a fit would see
-/// it: resampled where its clock is irregular, and cut where a value is missing. What cannot be said is left out, and
-/// the findings say why; [`Inspection::command`] is left to whoever knows the command line.
+/// Clock and quality are those of the rows as they are. Excitation, delay and feedback are of the log as a fit would
+/// see it: resampled where its clock is irregular, and cut where a value is missing. What cannot be said is left out,
+/// and the findings say why; [`Inspection::command`] is left to whoever knows the command line.
 ///
 /// Cost: O(N log N) for each channel, about a second for 10^6 rows of three channels.
 ///
 /// # Errors
-/// [`Error::Data`] if there are no rows, channels differ in length, share a name or hold an infinity, if a channel of the
-/// plan is not there, or the times are not finite or never advance; [`Error::Argument`] for a sample time or a step that
-/// is not positive, or a channel with two roles.
+/// [`Error::Data`] if there are no rows, channels differ in length, share a name or hold an infinity, if a channel of
+/// the plan is not there, or the times are not finite or never advance; [`Error::Argument`] for a sample time or a step
+/// that is not positive, or a channel with two roles.
 ///
 /// ```
 /// use thetahat::data::{Channel, Recording, Rows, Source, Times};
@@ -68,8 +68,8 @@ pub fn inspect(recording: Recording, source: &Source, plan: &InspectionPlan) -> 
     Ok(inspection)
 }
 
-/// The same of a log, of one experiment or several: nothing reaches from one into the next, and gaps are those of their own
-/// clocks.
+/// The same of a log, of one experiment or several: nothing reaches from one into the next, and gaps are those of their
+/// own clocks.
 ///
 /// # Errors
 /// As for [`inspect`].

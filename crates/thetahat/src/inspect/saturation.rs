@@ -33,10 +33,10 @@ pub(super) fn runs(values: &[f64]) -> impl Iterator<Item = Run> {
 /// Rows in runs of two and more at the limits, where a limit is crowded.
 ///
 /// A clipped signal piles up at its limit: far more rows stand there than at any of the values next to it. A binary or
-/// stepped signal has no such values; a smooth signal that was rounded has at most 2.4 times as many rows at its peak as at the
-/// level below, whatever its curvature (a parabola spends sqrt(q) within one rounding step q
-/// of its top and sqrt(2q) - sqrt(q) within the next: 1/(sqrt 2 - 1)), hence the factor of 5. A run with which the log begins or ends does not count:
-/// experiments begin and end at rest.
+/// stepped signal has no such values; a smooth signal that was rounded has at most 2.4 times as many rows at its peak
+/// as at the level below, whatever its curvature (a parabola spends sqrt(q) within one rounding step q of its top and
+/// sqrt(2q) - sqrt(q) within the next: 1/(sqrt 2 - 1)), hence the factor of 5. A run with which the log begins or ends
+/// does not count: experiments begin and end at rest.
 ///
 /// `sorted` are the values that are there, in rising order.
 pub(super) fn saturation(values: &[f64], sorted: &[f64]) -> Option<Saturation> {

@@ -20,10 +20,10 @@ const SHORTEST: usize = 8;
 /// S(w_k) = T/pi |sum_t h(t) x(t) exp(-i 2 pi k t/L)|^2 / sum_t h(t)^2,   w_k = 2 pi k/(L T),   k = 0 … L/2
 /// ```
 ///
-/// with Hann's window h. It is one-sided: by the trapezoidal rule, its integral from 0 to pi/T is the variance (that of the windowed
-/// samples, exactly). L is the largest power of two up to 1024 and a fourth of the samples that fits into a segment. No window
-/// reaches across the boundary of two segments. Empty if there are fewer than eight samples to a window, or a density leaves
-/// the range of numbers. O(N log L).
+/// with Hann's window h. It is one-sided: by the trapezoidal rule, its integral from 0 to pi/T is the variance (that of
+/// the windowed samples, exactly). L is the largest power of two up to 1024 and a fourth of the samples that fits into
+/// a segment. No window reaches across the boundary of two segments. Empty if there are fewer than eight samples to a
+/// window, or a density leaves the range of numbers. O(N log L).
 ///
 /// `deviations` are of mean zero and have sizes up to 1, in units of `unit`.
 pub(super) fn spectrum(
@@ -87,7 +87,8 @@ impl Periodograms {
         first
     }
 
-    /// Takes an offset from the values: Hann's window has a transform of L/2 and -L/4 at k = 0 and 1, and none elsewhere.
+    /// Takes an offset from the values: Hann's window has a transform of L/2 and -L/4 at k = 0 and 1, and none
+    /// elsewhere.
     pub(super) fn remove(&mut self, offset: f64) {
         let length = self.window.len() as f64;
         let count = f64::from(self.count);

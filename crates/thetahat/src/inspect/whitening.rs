@@ -14,11 +14,11 @@ const SAMPLES: usize = 10;
 /// Of the square of a signal, what an autoregression leaves is rounding below this fraction.
 const ROUNDING: f64 = 1e-10;
 
-/// The autoregression A(q) x(t) = e(t) of order 0 … 30 with the least MDL = k ln(N)/N + ln(sum e^2/N), all orders on the same
-/// samples: A, monic. It is a filter without feedback, so A need not be stable.
+/// The autoregression A(q) x(t) = e(t) of order 0 … 30 with the least MDL = k ln(N)/N + ln(sum e^2/N), all orders on
+/// the same samples: A, monic. It is a filter without feedback, so A need not be stable.
 ///
-/// The factor of the normal equations of a lower order is a part of that of the highest. Where a lag depends on those before it
-/// (a sum of sinusoids), or nothing but rounding is left, no higher order is tried. O(N).
+/// The factor of the normal equations of a lower order is a part of that of the highest. Where a lag depends on those
+/// before it (a sum of sinusoids), or nothing but rounding is left, no higher order is tried. O(N).
 pub(crate) fn autoregression(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     let total = samples(segments);
     let lagged = |count| {

@@ -6,8 +6,8 @@ use crate::Error;
 use crate::model::Orders;
 
 impl PolynomialModel {
-    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A matrix that
-    /// cannot be a covariance says nothing: that of the parameters is unknown then.
+    /// The model of some parameters, in the order of [`Orders::names`]. Its signals have no names and no offsets. A
+    /// matrix that cannot be a covariance says nothing: that of the parameters is unknown then.
     pub(crate) fn from_parameters(
         orders: &Orders,
         values: &[f64],

@@ -67,13 +67,13 @@ struct Plant {
 
 impl Model {
     /// The model in continuous time whose samples are this one, its inputs doing between samples what `hold` says: see
-    /// [`StateSpace::to_continuous`]. Delays of samples are taken off before and are delays in seconds. A process is in continuous time
-    /// as it is. Errors of parameters go through to first order (the delta method), by differences to either side along each direction in
-    /// which they vary; those of a process do not.
+    /// [`StateSpace::to_continuous`]. Delays of samples are taken off before and are delays in seconds. A process is in
+    /// continuous time as it is. Errors of parameters go through to first order (the delta method), by differences to
+    /// either side along each direction in which they vary; those of a process do not.
     ///
     /// # Errors
-    /// [`Error::Argument`] for models that are not linear, or written in equations, and one in continuous time already; those of
-    /// [`StateSpace::to_continuous`].
+    /// [`Error::Argument`] for models that are not linear, or written in equations, and one in continuous time already;
+    /// those of [`StateSpace::to_continuous`].
     ///
     /// ```
     /// use thetahat::data::Record;
@@ -129,9 +129,10 @@ impl Model {
         }
     }
 
-    /// The model as samples every so many seconds see it, by continuous time: see [`ContinuousStateSpaceModel::sampled`]. Without a `hold`
-    /// that of a model in continuous time, and `zoh` for others. With `zoh` and whole multiples of the own sample time poles that have no
-    /// logarithm need none: so many steps are one.
+    /// The model as samples every so many seconds see it, by continuous time: see
+    /// [`ContinuousStateSpaceModel::sampled`]. Without a `hold` that of a model in continuous time, and `zoh` for
+    /// others. With `zoh` and whole multiples of the own sample time poles that have no logarithm need none: so many
+    /// steps are one.
     ///
     /// # Errors
     /// Those of [`Model::to_continuous`] and [`ContinuousStateSpaceModel::sampled`].
@@ -175,8 +176,8 @@ impl Model {
         }
     }
 
-    /// The recursion to either side along each direction in which the model varies, without the samples that inputs wait; none where its
-    /// errors are not known.
+    /// The recursion to either side along each direction in which the model varies, without the samples that inputs
+    /// wait; none where its errors are not known.
     fn varied(&self) -> Option<Vec<[StateSpace; 2]>> {
         match self {
             Self::Polynomial(model) => {
@@ -235,7 +236,8 @@ impl Model {
 }
 
 impl StateSpace {
-    /// The model as every `count`-th sample sees it, its inputs held in between: powers of F, and the noise of single measurements.
+    /// The model as every `count`-th sample sees it, its inputs held in between: powers of F, and the noise of single
+    /// measurements.
     fn every(&self, count: u64, seconds: f64) -> Result<Self, Error> {
         let one = Steps::one(self);
         let before = Steps::repeated(&one, count - 1);
@@ -261,8 +263,8 @@ impl StateSpaceModel {
     }
 }
 
-/// The matrices without the states that wait, and how many wait of each input; of a model whose last states are no samples that wait, all of
-/// them.
+/// The matrices without the states that wait, and how many wait of each input; of a model whose last states are no
+/// samples that wait, all of them.
 fn stripped(whole: StateSpace, delays: &[usize]) -> (StateSpace, Vec<usize>) {
     let n = whole.f.nrows().saturating_sub(delays.iter().sum());
     let mut plant = StateSpace {
@@ -283,7 +285,8 @@ fn stripped(whole: StateSpace, delays: &[usize]) -> (StateSpace, Vec<usize>) {
 }
 
 impl PolynomialModel {
-    /// The recursion without the samples that inputs wait, beyond the one that a held input has by itself, and how many these are.
+    /// The recursion without the samples that inputs wait, beyond the one that a held input has by itself, and how many
+    /// these are.
     fn without_delays(&self) -> (StateSpace, Vec<usize>) {
         let mut own = self.clone();
         let mut delays = vec![0; own.b.len()];
@@ -297,8 +300,8 @@ impl PolynomialModel {
 }
 
 impl ProcessModel {
-    /// A, B, C and D, and the dead times as delays, with the errors that follow from those of the parameters; delays have none. Errors are
-    /// white from sample to sample.
+    /// A, B, C and D, and the dead times as delays, with the errors that follow from those of the parameters; delays
+    /// have none. Errors are white from sample to sample.
     fn in_state_space(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
         let matrices = self.matrices_of(&self.parts());
         let head = Head {

@@ -15,21 +15,22 @@
 //! g = B(1)/(A(1) F(1)):        dg/db_k = 1/(A(1) F(1)),   dg/da_k = -g/A(1),   dg/df_k = -g/F(1)
 //! ```
 //!
-//! Near an integrator tau and g are far from normal, and plus or minus some standard errors of them says nothing. What they are
-//! made of is nearly normal, |z|, B(1) and A(1) F(1), and their intervals are taken from there: tau rises with |z|, so that the
-//! ends of the interval of |z| are those of tau, without an upper one where 1 is inside; and g lies where
+//! Near an integrator tau and g are far from normal, and plus or minus some standard errors of them says nothing. What
+//! they are made of is nearly normal, |z|, B(1) and A(1) F(1), and their intervals are taken from there: tau rises
+//! with |z|, so that the ends of the interval of |z| are those of tau, without an upper one where 1 is inside; and g
+//! lies where
 //!
 //! ```text
 //! (n - g d)^2 <= q^2 var(n - g d),   n = B(1),   d = A(1) F(1)
 //! ```
 //!
 //! with the quantile q of the normal or Student's distribution (Fieller, Some problems in interval estimation, J. Royal
-//! Statistical Society B 16 (1954)). That is an interval while d differs from 0 with the same confidence; beyond, g has no upper
-//! end, and the sign of n as far as that is certain: d is positive for a stable model.
+//! Statistical Society B 16 (1954)). That is an interval while d differs from 0 with the same confidence; beyond, g has
+//! no upper end, and the sign of n as far as that is certain: d is positive for a stable model.
 //!
-//! Poles that are estimated near 1 come out too small, and more so where a level is taken off: there the t-statistic of d = 0 has
-//! the distribution of Dickey and Fuller (J. American Statistical Association 74 (1979)), and not the normal one. So an upper
-//! end is given only where that rejects an integrator.
+//! Poles that are estimated near 1 come out too small, and more so where a level is taken off: there the t-statistic of
+//! d = 0 has the distribution of Dickey and Fuller (J. American Statistical Association 74 (1979)), and not the normal
+//! one. So an upper end is given only where that rejects an integrator.
 
 #[cfg(test)]
 mod tests;
@@ -52,8 +53,8 @@ const ROUNDED: f64 = 1e-6;
 const NEAR: f64 = 0.1;
 /// How often an interval holds its figure.
 pub(super) const LEVEL: f64 = 0.95;
-/// Where the t-statistic of a root at 1 lies below in 2.5 % of logs, a constant being estimated too (Fuller, Introduction to
-/// Statistical Time Series, 1976, table 8.5.2). The normal distribution has 1.96 there.
+/// Where the t-statistic of a root at 1 lies below in 2.5 % of logs, a constant being estimated too (Fuller,
+/// Introduction to Statistical Time Series, 1976, table 8.5.2). The normal distribution has 1.96 there.
 const UNIT_ROOT: f64 = 3.12;
 /// 95 % of chi-square for one and two degrees of freedom.
 const CHI_SQUARE: [f64; 2] = [3.841, 5.991];
@@ -161,7 +162,8 @@ impl Block<'_> {
     }
 }
 
-/// Whether one of some roots has a covariance to first order: whether no other lies within four of its standard deviations.
+/// Whether one of some roots has a covariance to first order: whether no other lies within four of its standard
+/// deviations.
 pub(crate) fn is_simple(index: usize, roots: &[Complex<f64>], [[re, both], [_, im]]: &[[f64; 2]; 2]) -> bool {
     // No covariance exceeds its deviations: else all of it is rounding.
     let is_one = both.abs() <= (1.0 + ROUNDED) * (re * im).sqrt();
@@ -183,12 +185,12 @@ fn reciprocal(z: Complex<f64>) -> Complex<f64> {
     z.conj() / modulus / modulus
 }
 
-/// The covariance matrix of (re, im) of a quantity: J P J'. None where it cannot be had: where it is not finite, and where a
-/// variance is below zero, so that P is none of a covariance.
+/// The covariance matrix of (re, im) of a quantity: J P J'. None where it cannot be had: where it is not finite, and
+/// where a variance is below zero, so that P is none of a covariance.
 ///
-/// Rounding may leave a variance that is zero below it: |P_kl| <= s_k s_l, and a sum of products of n numbers with errors of eps
-/// is off by at most 4 n eps (sum_k |j_k| s_k)^2 (Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. 2002, section
-/// 3.1). What is not further below is zero.
+/// Rounding may leave a variance that is zero below it: |P_kl| <= s_k s_l, and a sum of products of n numbers with
+/// errors of eps is off by at most 4 n eps (sum_k |j_k| s_k)^2 (Higham, Accuracy and Stability of Numerical Algorithms,
+/// 2nd ed. 2002, section 3.1). What is not further below is zero.
 pub(crate) fn covariance(parameters: &[Vec<f64>], gradient: &Gradient) -> Option<[[f64; 2]; 2]> {
     let [mut rr, mut ri, mut ii] = [0.0; 3];
     let [mut re_size, mut im_size] = [0.0; 2];
@@ -285,8 +287,8 @@ fn ratio([n, d]: [f64; 2], [[nn, nd], [_, dd]]: [[f64; 2]; 2], quantile: f64, po
     if a > 0.0 && bounded {
         return Interval { lower: known(low), upper: known(high) };
     }
-    // Only n differs from 0: g lies beyond one end, and the sign of d says beyond which. That is the one nearest to 0, or the one
-    // of its sign.
+    // Only n differs from 0: g lies beyond one end, and the sign of d says beyond which. That is the one nearest to 0,
+    // or the one of its sign.
     match (positive && c > 0.0, n > 0.0) {
         (true, true) => Interval { lower: known(if a > 0.0 { low } else { high }), upper: None },
         (true, false) => Interval { lower: None, upper: known(if a > 0.0 { high } else { low }) },
@@ -327,8 +329,8 @@ pub(super) fn time_constant(pole: &Root, sample_time: f64, quantile: f64) -> Opt
 /// known, the distance alone counts: then the question makes sense only of a model that is known to have too many
 /// parameters.
 ///
-/// The common part of their movement cancels in z - p. So a common factor of B and F shows even where the data leave open
-/// where it is.
+/// The common part of their movement cancels in z - p. So a common factor of B and F shows even where the data leave
+/// open where it is.
 pub(crate) fn near_cancellation(model: &PolynomialModel) -> Option<(Root, Root)> {
     let blocks = Blocks::of(model);
     let parameters = model.covariance.as_deref();

@@ -58,27 +58,28 @@ use crate::Error;
 /// measurement = { y = 0.05 }
 /// ```
 ///
-/// **Expressions** have numbers, the names of states, inputs and parameters, `+ - * / ^` and parentheses, `sin cos tan asin
-/// acos atan sinh cosh tanh exp ln log10 sqrt abs sign` of one argument and `atan2 min max` of two, `pi`, and `t`, the
-/// seconds since the first row. Angles are in rad. `-x^2` is `-(x^2)`, `x^y^z` is `x^(y^z)`. A power whose exponent is no
-/// constant is `exp(y ln x)`, so x must be positive. Where `min`, `max`, `abs` or `sign` has no derivative, it is that of
-/// one side.
+/// **Expressions** have numbers, the names of states, inputs and parameters, `+ - * / ^` and parentheses, `sin cos tan
+/// asin acos atan sinh cosh tanh exp ln log10 sqrt abs sign` of one argument and `atan2 min max` of two, `pi`, and `t`,
+/// the seconds since the first row. Angles are in rad. `-x^2` is `-(x^2)`, `x^y^z` is `x^(y^z)`. A power whose exponent
+/// is no constant is `exp(y ln x)`, so x must be positive. Where `min`, `max`, `abs` or `sign` has no derivative, it is
+/// that of one side.
 ///
-/// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else each
-/// is one `sample_time`. `[derivative]` gives dx/dt; it is integrated by the classical Runge-Kutta method of order four in
-/// one step from row to row, or in `substeps` of them, with the input held. A step of several sample times is taken as that
-/// many equal steps, so that a missing row does no harm.
+/// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else
+/// each is one `sample_time`. `[derivative]` gives dx/dt; it is integrated by the classical Runge-Kutta method of order
+/// four in one step from row to row, or in `substeps` of them, with the input held. A step of several sample times is
+/// taken as that many equal steps, so that a missing row does no harm.
 ///
-/// **Noise.** `process` is what a sample of length `sample_time` adds to the state: its variance grows with the length of the
-/// step, sd² dt/sample_time. A state that is not named has none. `measurement` is the standard deviation of each output.
+/// **Noise.** `process` is what a sample of length `sample_time` adds to the state: its variance grows with the length
+/// of the step, sd² dt/sample_time. A state that is not named has none. `measurement` is the standard deviation of each
+/// output.
 ///
 /// **Unknown parameters** have a `start`, the standard deviation `sd` of what is known of it, and perhaps bounds `min`
-/// and `max`, between which a change of variable keeps them: p = min + exp(z), p = max - exp(z), or
-/// p = min + (max - min)/(1 + exp(-z)), with z free. `walk` is the standard deviation by which such a parameter drifts each
+/// and `max`, between which a change of variable keeps them: p = min + exp(z), p = max - exp(z), or p = min + (max -
+/// min)/(1 + exp(-z)), with z free. `walk` is the standard deviation by which such a parameter drifts each
 /// `sample_time`.
 ///
-/// All equations are compiled once into one list of operations in which nothing is computed twice, together with all partial
-/// derivatives, found by the rules of calculus. Nothing is approximated by differences.
+/// All equations are compiled once into one list of operations in which nothing is computed twice, together with all
+/// partial derivatives, found by the rules of calculus. Nothing is approximated by differences.
 ///
 /// ```
 /// use thetahat::model::GreyBox;
@@ -156,7 +157,8 @@ impl GreyBox {
     /// The same with some unknown parameters known: for what a fit has found.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the model has no unknown parameter of a name, a value is outside its bounds or not finite.
+    /// [`Error::Argument`] if the model has no unknown parameter of a name, a value is outside its bounds or not
+    /// finite.
     pub fn with_parameters(&self, values: &[(&str, f64)]) -> Result<Self, Error> {
         for (name, value) in values {
             let Some(unknown) = self.unknown.iter().find(|unknown| unknown.name == *name) else {
@@ -212,8 +214,8 @@ impl GreyBox {
         self.linear
     }
 
-    /// Whether what several inputs do adds up, at any time: the equations are linear in states and inputs together, and do not know
-    /// the time. Unknown parameters may stand anywhere in them.
+    /// Whether what several inputs do adds up, at any time: the equations are linear in states and inputs together, and
+    /// do not know the time. Unknown parameters may stand anywhere in them.
     pub fn superposes(&self) -> bool {
         self.superposes
     }

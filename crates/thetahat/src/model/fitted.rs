@@ -28,18 +28,20 @@ pub struct Parameter {
     pub standard_error: Option<f64>,
 }
 
-/// What is open of the output's offset, which is an estimate as the parameters are: found with them, or taken off before as a mean
-/// or a line. Beside it the model is, in deviations,
+/// What is open of the output's offset, which is an estimate as the parameters are: found with them, or taken off
+/// before as a mean or a line. Beside it the model is, in deviations,
 ///
 /// ```text
 /// A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + k + m (t - t_m) + C(q)/D(q) e(t)
 /// ```
 ///
-/// where k and m are zero as estimated, and uncertain. The offset of an input is part of what y's offset means, and is not.
+/// where k and m are zero as estimated, and uncertain. The offset of an input is part of what y's offset means, and is
+/// not.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OffsetCovariance {
-    /// The covariance matrix of the parameters, of k, and of m in units of y per second where a slope was taken, as all of them are
-    /// unknown, row by row. Where the offset was taken before the fit, with the square of what its estimate would have changed.
+    /// The covariance matrix of the parameters, of k, and of m in units of y per second where a slope was taken, as all
+    /// of them are unknown, row by row. Where the offset was taken before the fit, with the square of what its estimate
+    /// would have changed.
     pub covariance: Vec<Vec<f64>>,
     /// t_m, in seconds from a log's first row, where a slope was taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -85,17 +87,17 @@ pub struct PolynomialModel {
     #[serde(rename = "noise_covariance", with = "only_variance")]
     #[schemars(with = "[[f64; 1]; 1]")]
     pub noise_variance: f64,
-    /// N - p, less the initial conditions that were estimated: the degrees of freedom of `noise_variance`. None where it was
-    /// not estimated so, and in reports that do not say.
+    /// N - p, less the initial conditions that were estimated: the degrees of freedom of `noise_variance`. None where
+    /// it was not estimated so, and in reports that do not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
     /// The coefficients with their standard errors, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be computed, as
-    /// at the stability boundary.
+    /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be
+    /// computed, as at the stability boundary.
     pub covariance: Option<Vec<Vec<f64>>>,
-    /// What is open of the output's offset together with the parameters; none where it was given, where it is not known, and in
-    /// reports that do not say. Predictions, forecasts and drawn runs count it.
+    /// What is open of the output's offset together with the parameters; none where it was given, where it is not
+    /// known, and in reports that do not say. Predictions, forecasts and drawn runs count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset_covariance: Option<OffsetCovariance>,
     /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
@@ -162,8 +164,8 @@ pub(super) mod only_variance {
 }
 
 impl PolynomialModel {
-    /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and uncertain;
-    /// and those inputs over this many rows. None where nothing is said of it.
+    /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and
+    /// uncertain; and those inputs over this many rows. None where nothing is said of it.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
         let open = self.offset_covariance.as_ref()?;
         let (count, place) = (open.count(), self.orders.na + self.orders.nb.iter().sum::<usize>());
@@ -191,7 +193,8 @@ impl PolynomialModel {
         student_factor(self.degrees_of_freedom)
     }
 
-    /// How many standard errors from an estimate the end of an interval lies that holds its truth with probability `level`.
+    /// How many standard errors from an estimate the end of an interval lies that holds its truth with probability
+    /// `level`.
     pub(crate) fn quantile(&self, level: f64) -> f64 {
         student_two_sided(1.0 - level, self.degrees_of_freedom)
     }
@@ -265,7 +268,8 @@ impl PolynomialModel {
     }
 }
 
-/// J P J' for functions of the parameters with these slopes, P being the covariance of the parameters; none where that is not known.
+/// J P J' for functions of the parameters with these slopes, P being the covariance of the parameters; none where that
+/// is not known.
 pub(super) fn propagated(slopes: &[Vec<f64>], covariance: Option<&[Vec<f64>]>) -> Option<Vec<Vec<f64>>> {
     let covariance = covariance?;
     let entry = |left: &[f64], right: &[f64]| -> f64 {
@@ -280,8 +284,8 @@ pub(super) fn propagated(slopes: &[Vec<f64>], covariance: Option<&[Vec<f64>]>) -
 
 /// Whether a matrix may be a covariance: no variance is below zero, and no combination's by more than rounding.
 ///
-/// On the scale of the standard errors the rounding of P = L S L' is of the size n eps kappa(S), kappa(S) being the ratio of the
-/// largest to the least power density of the errors: up to 1e6.
+/// On the scale of the standard errors the rounding of P = L S L' is of the size n eps kappa(S), kappa(S) being the
+/// ratio of the largest to the least power density of the errors: up to 1e6.
 pub(crate) fn is_covariance(rows: &[Vec<f64>]) -> bool {
     const ROUNDING: f64 = 1e-9;
     let size = rows.len();

@@ -114,8 +114,8 @@ impl Model {
         }
     }
 
-    /// The parameters, in the order of the covariance. A state-space model has none: the entries of its matrices depend on the coordinates of
-    /// the state.
+    /// The parameters, in the order of the covariance. A state-space model has none: the entries of its matrices depend
+    /// on the coordinates of the state.
     pub fn parameters(&self) -> &[Parameter] {
         match self {
             Self::Polynomial(model) => &model.parameters,
@@ -171,7 +171,8 @@ impl Model {
         }
     }
 
-    /// Whether all of its poles are inside the unit circle, or in the left half plane; none of models that say nothing of it.
+    /// Whether all of its poles are inside the unit circle, or in the left half plane; none of models that say nothing
+    /// of it.
     pub fn stability(&self) -> Option<bool> {
         match self {
             Self::Polynomial(model) => Some(model.stable),
@@ -192,7 +193,8 @@ impl Model {
         }
     }
 
-    /// The gains of a sampled linear model for inputs that do not change, a list of the inputs' for each output; none of others.
+    /// The gains of a sampled linear model for inputs that do not change, a list of the inputs' for each output; none
+    /// of others.
     pub fn static_gains(&self) -> Option<Vec<&[Option<Quantity>]>> {
         match self {
             Self::Polynomial(model) => Some(vec![&model.dc_gain]),
@@ -215,7 +217,8 @@ impl Model {
         }
     }
 
-    /// How many parameters of the noise take correlations from the errors of several outputs: F and K of a canonical form.
+    /// How many parameters of the noise take correlations from the errors of several outputs: F and K of a canonical
+    /// form.
     pub(crate) fn noise_parameters(&self) -> usize {
         match self {
             Self::StateSpace(model) => 2 * model.order() * model.outputs.len(),
@@ -395,8 +398,8 @@ impl Model {
         }
     }
 
-    /// What the model is from its inputs to each of its outputs: of linear equations, and of processes whose inputs are held from sample to
-    /// sample, their transfer functions.
+    /// What the model is from its inputs to each of its outputs: of linear equations, and of processes whose inputs are
+    /// held from sample to sample, their transfer functions.
     ///
     /// # Errors
     /// [`Error::Argument`] if it is not linear, with what it can do instead; `what` needs it to be.

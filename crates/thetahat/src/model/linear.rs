@@ -67,7 +67,8 @@ impl LinearModel<'_> {
         }
     }
 
-    /// Whether it has one noise and says what becomes of it. Of a state-space model each output has a noise of its own, and all may reach it.
+    /// Whether it has one noise and says what becomes of it. Of a state-space model each output has a noise of its own,
+    /// and all may reach it.
     pub fn has_noise(&self) -> bool {
         match self {
             Self::Polynomial(_) => true,

@@ -23,9 +23,10 @@ use crate::Error;
 /// y_i(t) = s_i g_i(z(t)) + e_i(t),   z_r(t) = x_r(t - l_r)/s_r,   g_i(z) = sum_j theta_j f_j(z)
 /// ```
 ///
-/// where x_r is an output, an input, or an expression of them, as a deviation from its offset, l_r a lag, s_r the scale of that channel,
-/// s_i that of the output, and f_j the functions of its [`Map`] (Ljung, System Identification, 2nd ed. 1999, section 5.4). Scales and
-/// offsets come from the rows of the estimation, so that z has about the size of 1. All maps read the same z.
+/// where x_r is an output, an input, or an expression of them, as a deviation from its offset, l_r a lag, s_r the scale
+/// of that channel, s_i that of the output, and f_j the functions of its [`Map`] (Ljung, System Identification, 2nd ed.
+/// 1999, section 5.4). Scales and offsets come from the rows of the estimation, so that z has about the size of 1. All
+/// maps read the same z.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NonlinearArxModel {
     /// Seconds from one sample to the next.
@@ -34,23 +35,24 @@ pub struct NonlinearArxModel {
     pub inputs: Vec<Signal>,
     /// The outputs.
     pub outputs: Vec<Signal>,
-    /// Expressions of inputs and outputs that are read like these, such as sqrt(u). The name of each is its text; it is of the values of the
-    /// channels in their own units.
+    /// Expressions of inputs and outputs that are read like these, such as sqrt(u). The name of each is its text; it is
+    /// of the values of the channels in their own units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub expressions: Vec<Signal>,
     /// z, in its order.
     pub regressors: Vec<Regressor>,
     /// g and s of each output.
     pub maps: Vec<OutputMap>,
-    /// The covariance of e, row by row: the sums of products of residuals over N - p, with the root of both N - p where these differ.
+    /// The covariance of e, row by row: the sums of products of residuals over N - p, with the root of both N - p where
+    /// these differ.
     pub noise_covariance: Vec<Vec<f64>>,
     /// N - p of the output with most parameters, the degrees of freedom of `noise_covariance`.
     pub degrees_of_freedom: Option<usize>,
     /// theta, one for each function of each map, in the order of `covariance`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row; none where no theory gives one. Of one map that was trained, rows of the numbers
-    /// of its functions come after them: alpha and 1/sigma of each radial basis function, or w and b of each unit. It is approximate then:
-    /// that of Gauss and Newton with white errors.
+    /// The covariance matrix of the parameters, row by row; none where no theory gives one. Of one map that was
+    /// trained, rows of the numbers of its functions come after them: alpha and 1/sigma of each radial basis function,
+    /// or w and b of each unit. It is approximate then: that of Gauss and Newton with white errors.
     pub covariance: Option<Vec<Vec<f64>>>,
 }
 
@@ -63,7 +65,8 @@ pub struct OutputMap {
     pub range: [f64; 2],
     /// The functions f.
     pub functions: Map,
-    /// The errors of runs over rows that were held out, in rising order of how long ago they began; none where no rows were.
+    /// The errors of runs over rows that were held out, in rising order of how long ago they began; none where no rows
+    /// were.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub run_errors: Vec<RunError>,
 }
@@ -78,8 +81,8 @@ pub struct RunError {
 }
 
 impl OutputMap {
-    /// The root mean square error of runs of so many samples, between those that were measured by the logarithm of their length, and beyond
-    /// the longest that of the longest; none where no rows were held out.
+    /// The root mean square error of runs of so many samples, between those that were measured by the logarithm of
+    /// their length, and beyond the longest that of the longest; none where no rows were held out.
     ///
     /// ```
     /// use thetahat::model::{Map, OutputMap, RunError};
@@ -219,7 +222,8 @@ impl NonlinearArxModel {
     /// Its lags as the orders of an ARX model with one output: na of the output, and nb of each input from nk on.
     ///
     /// # Errors
-    /// [`Error::Report`] where there are several outputs, or regressors are not lags in a row, each channel with one scale.
+    /// [`Error::Report`] where there are several outputs, or regressors are not lags in a row, each channel with one
+    /// scale.
     pub fn lag_orders(&self) -> Result<Orders, Error> {
         let (_, map) = self.single("a recursion")?;
         if let Some(expression) = self.expressions.first() {

@@ -65,7 +65,8 @@ impl Orders {
         Self::new(na, nb, 0, 0, &vec![0; nb.len()], nk)
     }
 
-    /// The orders of an ARMAX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + C(q) e(t). Without inputs: of an ARMA model.
+    /// The orders of an ARMAX model, A(q) y(t) = sum_j B_j(q) u_j(t - nk_j) + C(q) e(t). Without inputs: of an ARMA
+    /// model.
     ///
     /// # Errors
     /// As for [`Orders::new`].
@@ -224,7 +225,8 @@ impl Orders {
         (0..self.inputs()).map(|input| self.maximum_input_lag(input)).fold(self.na, usize::max)
     }
 
-    /// With this many further inputs after their own, of one coefficient each that acts at once: those of a constant and a trend.
+    /// With this many further inputs after their own, of one coefficient each that acts at once: those of a constant
+    /// and a trend.
     pub(crate) fn with_constants(&self, count: usize) -> Self {
         let more = |values: &[usize], value| [values, &vec![value; count]].concat();
         Self { nb: more(&self.nb, 1), nf: more(&self.nf, 0), nk: more(&self.nk, 0), ..self.clone() }
@@ -235,20 +237,22 @@ impl Orders {
         if self.nb[input] == 0 { 0 } else { self.nb[input] + self.nk[input] - 1 }
     }
 
-    /// How many first samples of a segment have no e where nothing before it is known and no initial-condition response of 1/F makes
-    /// up for it: max(na, nb + nk - 1 of the inputs without F), and nd more. For ARX this is the maximum lag.
+    /// How many first samples of a segment have no e where nothing before it is known and no initial-condition response
+    /// of 1/F makes up for it: max(na, nb + nk - 1 of the inputs without F), and nd more. For ARX this is the maximum
+    /// lag.
     pub(crate) fn conditioned(&self) -> usize {
         let direct = (0..self.inputs()).filter(|&input| self.nf[input] == 0);
         direct.map(|input| self.maximum_input_lag(input)).fold(self.na, usize::max) + self.nd
     }
 
-    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With this many known,
-    /// all samples of the segment have an error.
+    /// How many samples before a segment its errors reach back to: max(na, nb + nk - 1 of all inputs) + nd. With this
+    /// many known, all samples of the segment have an error.
     pub(crate) fn history(&self) -> usize {
         self.maximum_lag() + self.nd
     }
 
-    /// Whether errors depend on past outputs. If not, A = C = D = 1, a missing output is a missing error and nothing more.
+    /// Whether errors depend on past outputs. If not, A = C = D = 1, a missing output is a missing error and nothing
+    /// more.
     pub(crate) fn needs_past_outputs(&self) -> bool {
         self.na + self.nc + self.nd > 0
     }
@@ -258,13 +262,15 @@ impl Orders {
         self.nf.iter().any(|&nf| nf > 0)
     }
 
-    /// The number of initial-condition responses of 1/F for an input: what unknown samples before a segment do to B/F u is, from sample
-    /// nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero, the mean.
+    /// The number of initial-condition responses of 1/F for an input: what unknown samples before a segment do to B/F u
+    /// is, from sample nb + nk - 1 on, a combination of nf of them. Before that earlier inputs are taken to be zero,
+    /// the mean.
     pub(crate) fn free_responses(&self, input: usize) -> usize {
         self.nf[input]
     }
 
-    /// The same where earlier inputs are not taken to be zero: max(nf, nb + nk - 1), the first `known` inputs being known.
+    /// The same where earlier inputs are not taken to be zero: max(nf, nb + nk - 1), the first `known` inputs being
+    /// known.
     pub(crate) fn free_responses_and_inputs(&self, input: usize, known: usize) -> usize {
         let nf = self.nf[input];
         if nf == 0 { 0 } else { nf.max(self.maximum_input_lag(input).saturating_sub(known)) }
@@ -292,8 +298,8 @@ impl Orders {
     }
 }
 
-/// As the field writes them: `ARX(2, 2, 3)` is ARX(na, nb, nk), and so on, see [`Orders::legend`]. Several inputs stand in
-/// brackets where they differ.
+/// As the field writes them: `ARX(2, 2, 3)` is ARX(na, nb, nk), and so on, see [`Orders::legend`]. Several inputs stand
+/// in brackets where they differ.
 ///
 /// ```
 /// assert_eq!(thetahat::model::Orders::oe(&[2], &[1], &[3])?.to_string(), "OE(2, 1, 3)");

@@ -12,17 +12,17 @@ const NEWTON_STEPS: usize = 2;
 
 /// The finite roots in z of p0 + p1 z^-1 + … + pn z^-n, that is of p0 z^n + p1 z^(n-1) + … + pn.
 ///
-/// Leading zeros (a delay) are left out, and so is a leading coefficient so small that its root overflows. All roots are
-/// improved at once,
+/// Leading zeros (a delay) are left out, and so is a leading coefficient so small that its root overflows. All roots
+/// are improved at once,
 ///
 /// ```text
 /// z_i <- z_i - N_i / (1 - N_i sum_j 1/(z_i - z_j)),   N_i = p(z_i)/p'(z_i),
 /// ```
 ///
-/// from starts on the circles of the Newton polygon, until |p(z_i)| is below its rounding (Aberth 1973; Bini,
-/// Numerical computation of polynomial zeros by means of Aberth's method, Numerical Algorithms 13, 1996). So each root is
-/// exact for coefficients that differ from the given ones by rounding, each relative to itself. Eigenvalues of the
-/// companion matrix are not: a B with one small leading coefficient has a large zero, beside which they lose the others.
+/// from starts on the circles of the Newton polygon, until |p(z_i)| is below its rounding (Aberth 1973; Bini, Numerical
+/// computation of polynomial zeros by means of Aberth's method, Numerical Algorithms 13, 1996). So each root is exact
+/// for coefficients that differ from the given ones by rounding, each relative to itself. Eigenvalues of the companion
+/// matrix are not: a B with one small leading coefficient has a large zero, beside which they lose the others.
 ///
 /// Largest first; of a conjugate pair the positive imaginary part first. O(n^2) for each sweep.
 /// `None` if a coefficient is not finite, or the iteration does not converge, which no polynomial is known to cause.

@@ -25,14 +25,15 @@ use crate::Error;
 /// y(t) = sum_j G_j(s) u_j(t) + e(t)
 /// ```
 ///
-/// y and u are deviations from the signals' offsets. Inputs are held from each row to the next one, and the response is exact at the
-/// times of the rows, whatever the clock. Before the first row of a log the process has been at rest with the input of that row.
+/// y and u are deviations from the signals' offsets. Inputs are held from each row to the next one, and the response is
+/// exact at the times of the rows, whatever the clock. Before the first row of a log the process has been at rest with
+/// the input of that row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProcessModel {
     /// What it is from each input, such as `p1d`.
     pub structures: Vec<ProcessStructure>,
-    /// The median time from one row to the next of the log that it was fitted to, in seconds: responses and frequency responses are
-    /// those of an input that is held as long.
+    /// The median time from one row to the next of the log that it was fitted to, in seconds: responses and frequency
+    /// responses are those of an input that is held as long.
     pub sample_time: f64,
     /// The inputs.
     pub inputs: Vec<Signal>,
@@ -40,10 +41,11 @@ pub struct ProcessModel {
     #[serde(rename = "outputs", with = "only")]
     #[schemars(with = "[Signal; 1]")]
     pub output: Signal,
-    /// The parameters with their standard errors, those of one input after those of the other, in the order of `covariance`. With
-    /// several inputs their names end with that of the input, such as `K[heater]`.
+    /// The parameters with their standard errors, those of one input after those of the other, in the order of
+    /// `covariance`. With several inputs their names end with that of the input, such as `K[heater]`.
     pub parameters: Vec<Parameter>,
-    /// The covariance matrix of the parameters, row by row: errors may have any colour. None where it cannot be computed.
+    /// The covariance matrix of the parameters, row by row: errors may have any colour. None where it cannot be
+    /// computed.
     pub covariance: Option<Vec<Vec<f64>>>,
     /// The same together with the offset of the output; none where that was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -4,7 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::Complex;
 
-/// A root of one of a model's polynomials in the z plane; a pole of a model in continuous time in the s plane, in radians a second.
+/// A root of one of a model's polynomials in the z plane; a pole of a model in continuous time in the s plane, in
+/// radians a second.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Root {
     /// The polynomial, such as `a` or `f`; with several inputs `f2` and `b2` are those of the second.
@@ -33,9 +34,10 @@ pub struct Quantity {
     /// The square root of its variance to first order; none where that of the parameters is unknown, or of a pole
     /// whose own is.
     pub standard_error: Option<f64>,
-    /// An interval that holds it with a probability of 95 %. Of a time constant it comes from the interval of the pole's modulus,
-    /// of a static gain from Fieller's theorem: near an integrator it is right where plus or minus two standard errors is not.
-    /// None where the standard error is none, and for figures of which the standard error says enough.
+    /// An interval that holds it with a probability of 95 %. Of a time constant it comes from the interval of the
+    /// pole's modulus, of a static gain from Fieller's theorem: near an integrator it is right where plus or minus two
+    /// standard errors is not. None where the standard error is none, and for figures of which the standard error says
+    /// enough.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<Interval>,
 }

@@ -32,9 +32,9 @@ pub use zeros::ZerosPolesGain;
 /// y(t)   = H x(t) + D u(t) + e(t),   cov e = noise_covariance
 /// ```
 ///
-/// (Ljung, System Identification, 2nd ed. 1999, section 4.3). y and u are deviations from the model's offsets, so that the
-/// state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by [`PolynomialModel::state_space`], and
-/// from signals by [`subspace`](crate::estimate::subspace()).
+/// (Ljung, System Identification, 2nd ed. 1999, section 4.3). y and u are deviations from the model's offsets, so that
+/// the state at rest is zero. F and D here are matrices, not the polynomials of these letters. Made by
+/// [`PolynomialModel::state_space`], and from signals by [`subspace`](crate::estimate::subspace()).
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateSpace {
     /// F, n x n: what becomes of the state.
@@ -55,7 +55,8 @@ pub struct StateSpace {
 
 impl StateSpace {
     /// # Errors
-    /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite, and a sample time that is not above 0.
+    /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite, and a sample time that is not
+    /// above 0.
     fn check(&self) -> Result<(), Error> {
         fit_together([
             ("F", &self.f),
@@ -74,7 +75,8 @@ impl StateSpace {
 }
 
 /// # Errors
-/// [`Error::Argument`] if the matrices of a model, those of [`StateSpace`] in their order, are not finite or not of shapes that fit.
+/// [`Error::Argument`] if the matrices of a model, those of [`StateSpace`] in their order, are not finite or not of
+/// shapes that fit.
 fn fit_together(matrices: [(&str, &DMatrix<f64>); 6]) -> Result<(), Error> {
     let [(state, transition), _, _, (direct, feedthrough), _, _] = matrices;
     let (n, l, m) = (transition.nrows(), feedthrough.nrows(), feedthrough.ncols());
@@ -118,13 +120,13 @@ impl PolynomialModel {
     ///     + max(nc, nd) if nd > 0
     /// ```
     ///
-    /// and the eigenvalues of F are the roots of A, of each F_j and of D; those that are left are 0. An input without B has
-    /// no state. Fewer states would do only where two blocks have an eigenvalue in common, which may be the 0 of a B that is
-    /// longer than its denominator, or where a numerator and a denominator have a root in common. For the form see Kailath,
-    /// Linear Systems, 1980, section 2.1.
+    /// and the eigenvalues of F are the roots of A, of each F_j and of D; those that are left are 0. An input without B
+    /// has no state. Fewer states would do only where two blocks have an eigenvalue in common, which may be the 0 of a
+    /// B that is longer than its denominator, or where a numerator and a denominator have a root in common. For the
+    /// form see Kailath, Linear Systems, 1980, section 2.1.
     ///
-    /// A Kalman filter takes it with w = K e and v = e: Q = K K' var e, S = K var e, R = var e. In the long run its gain is K
-    /// where all roots of C and of each F_j lie inside the unit circle.
+    /// A Kalman filter takes it with w = K e and v = e: Q = K K' var e, S = K var e, R = var e. In the long run its
+    /// gain is K where all roots of C and of each F_j lie inside the unit circle.
     ///
     /// Cost: O(n (n + m)) to write the matrices.
     ///

@@ -1,7 +1,7 @@
 //! Reports as pages: one file of HTML that loads nothing, with charts that can be zoomed.
 //!
-//! Names of channels and files are shown as they are, whatever is in them: text is escaped where it is written, data inside
-//! scripts by [`text::inside_script`], and text for the charting library, which reads some HTML itself, by
+//! Names of channels and files are shown as they are, whatever is in them: text is escaped where it is written, data
+//! inside scripts by [`text::inside_script`], and text for the charting library, which reads some HTML itself, by
 //! [`text::plain`]. A content security policy forbids every request and every script but the page's own.
 
 mod charts;
@@ -44,8 +44,9 @@ const UNASKED: &str = "Not asked: models of output error and those by instrument
 
 /// The page of a fit: what the model is, how it was found, and how it does on each part of the log.
 ///
-/// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole log.
-/// `held_out` is what [`held_out_runs`](crate::report::held_out_runs) gives, or nothing. `command` is shown as what made the page.
+/// `validated` has one entry for each part: estimation, validation, test, as far as there are any, all on the whole
+/// log. `held_out` is what [`held_out_runs`](crate::report::held_out_runs) gives, or nothing. `command` is shown as
+/// what made the page.
 pub fn fit_page(
     report: &Report,
     validated: &[Validated],

@@ -27,15 +27,17 @@ pub struct Applied {
 pub struct AppliedOutput {
     /// Its name.
     pub name: String,
-    /// The measured output, one value for each row of the log; NaN where it is missing. None if the log does not have it.
+    /// The measured output, one value for each row of the log; NaN where it is missing. None if the log does not have
+    /// it.
     pub measured: Option<Vec<f64>>,
     /// The response, one value for each row of the log and then for each of the `beyond` rows after it; NaN outside the
-    /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, for models without A,
-    /// C and D, and for those in equations.
+    /// rows asked for, in gaps, and before a start. Gaps of the output alone are none for free runs, for models without
+    /// A, C and D, and for those in equations.
     pub predicted: Vec<f64>,
-    /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that each value
-    /// looks ahead, as [`prediction_deviations`](crate::respond::prediction_deviations) and [`forecast`](crate::respond::forecast) have them;
-    /// NaN where there is none. Of a free run those that a nonlinear ARX model has measured on rows that were held out, else None.
+    /// The standard deviations of the errors of `predicted`, those of the parameters among them, for the steps that
+    /// each value looks ahead, as [`prediction_deviations`](crate::respond::prediction_deviations) and
+    /// [`forecast`](crate::respond::forecast) have them; NaN where there is none. Of a free run those that a nonlinear
+    /// ARX model has measured on rows that were held out, else None.
     pub standard_deviations: Option<Vec<f64>>,
     /// How close they are. None if the log does not have the output.
     pub fit: Option<Fit>,
@@ -46,19 +48,20 @@ pub struct AppliedOutput {
 /// `rows` are those to respond to; none: all. The model's own offsets are used unless `detrend` says how to find
 /// others on these rows. A free run also works on a log without the model's outputs, from [`InitialCondition::Zero`].
 ///
-/// A prediction k steps ahead is also a forecast of the k samples after the last usable row, each as many steps
-/// ahead as it lies after that row: of rows asked for that have the inputs but not the output, and, for a model that
-/// no input drives and if the log's last row was asked for, of rows after the log's end, in its own time step. There
-/// is no forecast where the last segment without a gap is too short to start from. A model without A, C and D needs no past
-/// output: it has a value in every row that its inputs reach. So has one in equations, of which every prediction starts from what its
-/// filter knows k rows before.
+/// A prediction k steps ahead is also a forecast of the k samples after the last usable row, each as many steps ahead
+/// as it lies after that row: of rows asked for that have the inputs but not the output, and, for a model that no input
+/// drives and if the log's last row was asked for, of rows after the log's end, in its own time step. There is no
+/// forecast where the last segment without a gap is too short to start from. A model without A, C and D needs no past
+/// output: it has a value in every row that its inputs reach. So has one in equations, of which every prediction starts
+/// from what its filter knows k rows before.
 ///
-/// A model in equations begins in the state that it says in the first row of a log; [`Report::apply`] knows where it was fitted.
+/// A model in equations begins in the state that it says in the first row of a log; [`Report::apply`] knows where it
+/// was fitted.
 ///
 /// # Errors
-/// [`Error::Data`] for channels or rows that are not there, a sample time that differs from the model's by more than
-/// 1 %, or a clock that the model cannot follow; and as for [`predict`](crate::respond::predict), [`simulate`](crate::respond::simulate) and
-/// [`forecast`](crate::respond::forecast).
+/// [`Error::Data`] for channels or rows that are not there, a sample time that differs from the model's by more than 1
+/// %, or a clock that the model cannot follow; and as for [`predict`](crate::respond::predict),
+/// [`simulate`](crate::respond::simulate) and [`forecast`](crate::respond::forecast).
 pub fn apply(
     model: &Model,
     log: &Log,
@@ -71,8 +74,8 @@ pub fn apply(
 }
 
 impl Report {
-    /// [`apply`] of its model to a log of which it may have been fitted to some rows: there a model in equations begins with the first
-    /// of them.
+    /// [`apply`] of its model to a log of which it may have been fitted to some rows: there a model in equations begins
+    /// with the first of them.
     ///
     /// # Errors
     /// As for [`apply`].
@@ -87,8 +90,9 @@ impl Report {
         applied(&self.model, log, rows, detrend, (horizon, initial), (&rows_of_fit(self, log)?, false))
     }
 
-    /// A free run of a nonlinear ARX model of which each output that is fed back is kept within 1.1 times the range of the estimation rows,
-    /// about its middle: finite, if not good, where the free run leaves the data. `clamped` counts the values that were.
+    /// A free run of a nonlinear ARX model of which each output that is fed back is kept within 1.1 times the range of
+    /// the estimation rows, about its middle: finite, if not good, where the free run leaves the data. `clamped` counts
+    /// the values that were.
     ///
     /// # Errors
     /// As for [`apply`]; [`Error::Argument`] for models of other kinds.

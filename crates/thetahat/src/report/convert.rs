@@ -6,9 +6,9 @@ use crate::estimate::Criteria;
 use crate::model::{Hold, Model, TimeBase};
 
 impl Report {
-    /// The report with its model in continuous time or at another sample time: see [`Model::to_continuous`] and [`Model::at_sample_time`].
-    /// Without a `hold` that of a model in continuous time, and `zoh` for others. It keeps what it says of the data, and has no figures of
-    /// a fit: validate it.
+    /// The report with its model in continuous time or at another sample time: see [`Model::to_continuous`] and
+    /// [`Model::at_sample_time`]. Without a `hold` that of a model in continuous time, and `zoh` for others. It keeps
+    /// what it says of the data, and has no figures of a fit: validate it.
     ///
     /// # Errors
     /// Those of [`Model::to_continuous`] and [`Model::at_sample_time`].

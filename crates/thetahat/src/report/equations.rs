@@ -44,8 +44,8 @@ pub struct EquationsPlan {
 
 /// Finds the unknown parameters of a model in equations in a log, or in several that are joined, and reports on it.
 ///
-/// The predictor is the extended Kalman filter with the noises of the model. With its innovations e and their variances S
-/// over all values of outputs that were measured, the estimate is
+/// The predictor is the extended Kalman filter with the noises of the model. With its innovations e and their variances
+/// S over all values of outputs that were measured, the estimate is
 ///
 /// ```text
 /// p^ = argmin V(p),   V = 1/2 sum (e^2/S + ln 2 pi S)
@@ -53,18 +53,21 @@ pub struct EquationsPlan {
 ///
 /// the maximum-likelihood estimate where innovations are Gaussian. Without process noise that is output error with an
 /// estimated initial state, of which the model knows `start` and `sd`. Each log starts from there anew. Of an unknown
-/// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it with the state.
-/// A search finds the minimum that its start leads to. Further starts, as many as `search.starts` says, are drawn from what the model
-/// knows of the parameters, start and `sd` after the change of variable; the largest likelihood that is reached wins.
+/// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it
+/// with the state. A search finds the minimum that its start leads to. Further starts, as many as `search.starts` says,
+/// are drawn from what the model knows of the parameters, start and `sd` after the change of variable; the largest
+/// likelihood that is reached wins.
 ///
-/// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not asked for but
-/// stand after go through the filter and do not count; so is the model evaluated on other rows of these logs. Each further row is predicted over the time from the row before,
-/// with that row's inputs, and then corrected by its own outputs. The clock may be irregular
-/// ([`Log::recorded`](crate::data::Log::recorded)). A missing output (NaN) is left out alone; a missing input holds the value before it, zero before the first.
+/// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not
+/// asked for but stand after go through the filter and do not count; so is the model evaluated on other rows of these
+/// logs. Each further row is predicted over the time from the row before, with that row's inputs, and then corrected by
+/// its own outputs. The clock may be irregular ([`Log::recorded`](crate::data::Log::recorded)). A missing output (NaN)
+/// is left out alone; a missing input holds the value before it, zero before the first.
 ///
-/// **Search.** Fisher scoring with the damping of Levenberg and Marquardt, unless `search.algorithm` says otherwise: the information
-/// stands for the Gauss-Newton matrix; Newton and Raphson's Hessian comes from differences of the gradient. Derivatives of e and S are
-/// exact: the filter is computed in dual numbers. `monitor` is told of V divided by the number of measured values before each iteration, on the thread that searches.
+/// **Search.** Fisher scoring with the damping of Levenberg and Marquardt, unless `search.algorithm` says otherwise:
+/// the information stands for the Gauss-Newton matrix; Newton and Raphson's Hessian comes from differences of the
+/// gradient. Derivatives of e and S are exact: the filter is computed in dual numbers. `monitor` is told of V divided
+/// by the number of measured values before each iteration, on the thread that searches.
 ///
 /// **Standard errors** come from the inverse of the information, with e_i and S_i the derivatives by parameter i,
 ///
@@ -72,18 +75,21 @@ pub struct EquationsPlan {
 /// I_ij = sum (e_i e_j/S + S_i S_j/(2 S^2))
 /// ```
 ///
-/// which holds if the noises of the model are those of the log. Then the mean of e^2/S is 1. Where it is above 1, the covariance is multiplied by it: that is
-/// right if all noises are too small by one factor, and a good guess else. Where it is below 1 the covariance stays, as too
-/// large a noise must not make an estimate look certain. The report has the plain ones too.
+/// which holds if the noises of the model are those of the log. Then the mean of e^2/S is 1. Where it is above 1, the
+/// covariance is multiplied by it: that is right if all noises are too small by one factor, and a good guess else.
+/// Where it is below 1 the covariance stays, as too large a noise must not make an estimate look certain. The report
+/// has the plain ones too.
 ///
 /// For n states, m outputs, p parameters and N rows an iteration costs O(N (n^3 + m n^2) p).
 ///
-/// Source: Ljung, System Identification, 2nd ed. 1999, sections 7.2 to 7.4; Gupta and Mehra 1974; Segal and Weinstein 1989.
+/// Source: Ljung, System Identification, 2nd ed. 1999, sections 7.2 to 7.4; Gupta and Mehra 1974; Segal and Weinstein
+/// 1989.
 ///
 /// # Errors
-/// [`Error::Argument`] if nothing in the model is unknown, or for rows that are not there; [`Error::Data`] if a channel is not there, the clock
-/// does not run forward, a step is not one that the model can take, or the filter leaves the range of numbers where the search
-/// starts; [`Error::Undetermined`] with the parameters that the logs leave open, or that ran away to where they have no effect; [`Error::Interrupted`] if the monitor says so.
+/// [`Error::Argument`] if nothing in the model is unknown, or for rows that are not there; [`Error::Data`] if a channel
+/// is not there, the clock does not run forward, a step is not one that the model can take, or the filter leaves the
+/// range of numbers where the search starts; [`Error::Undetermined`] with the parameters that the logs leave open, or
+/// that ran away to where they have no effect; [`Error::Interrupted`] if the monitor says so.
 ///
 /// ```
 /// use std::ops::ControlFlow;
@@ -130,13 +136,14 @@ pub fn fit_equations(
     })
 }
 
-/// The same, but others compute the likelihood and its slopes for each point where the search stands: each holder has some of the logs
-/// that `log` is [joined](Log::join) of, `counts` of them, in their order, and gives an [`answer_equations`] to what `ask` hands on. One
-/// search begins after the other. For logs of a few rows too: a row costs O((n^3 + m n^2) p) operations.
+/// The same, but others compute the likelihood and its slopes for each point where the search stands: each holder has
+/// some of the logs that `log` is [joined](Log::join) of, `counts` of them, in their order, and gives an
+/// [`answer_equations`] to what `ask` hands on. One search begins after the other. For logs of a few rows too: a row
+/// costs O((n^3 + m n^2) p) operations.
 ///
 /// # Errors
-/// As for [`fit_equations`], and what `ask` says; [`Error::Argument`] for a plan with rows to fit to or to validate on, or counts of other
-/// logs.
+/// As for [`fit_equations`], and what `ask` says; [`Error::Argument`] for a plan with rows to fit to or to validate on,
+/// or counts of other logs.
 pub fn fit_equations_distributed(
     model: &GreyBox,
     (log, sources): (&Log, &[Source]),
@@ -166,8 +173,8 @@ pub fn fit_equations_distributed(
 /// What the logs of one holder answer, see [`fit_equations_distributed`].
 ///
 /// # Errors
-/// [`Error::Argument`] if the question is about another model; [`Error::Data`] for a channel that is not there, and a step that the model
-/// cannot take.
+/// [`Error::Argument`] if the question is about another model; [`Error::Data`] for a channel that is not there, and a
+/// step that the model cannot take.
 pub fn answer_equations(model: &GreyBox, log: &Log, question: &Question) -> Result<Answer, Error> {
     let all = [Rows::new(1, log.rows())?];
     question.answered_by_equations(model, &experiments(model, log, &all, &all)?)
@@ -267,8 +274,8 @@ fn fit(
 
 /// How large the innovations of a fit are.
 struct Errors {
-    /// Of each row with something measured, the sum of e^2/S: as the filter's elements come one after the other, each with the
-    /// variance that is left by those before, this is the normalised innovation squared of the row.
+    /// Of each row with something measured, the sum of e^2/S: as the filter's elements come one after the other, each
+    /// with the variance that is left by those before, this is the normalised innovation squared of the row.
     nis: Option<NisSummary>,
     /// The mean of (y - h(x^))^2.
     mse: f64,

@@ -23,21 +23,23 @@ use crate::estimate::{
 use crate::model::{Orders, Structure};
 use crate::select::{Choice, Focus};
 
-/// Experiments that others hold, in other processes or on other machines, as one model of all of them sees them: OE, ARMAX, Box-Jenkins,
-/// or any other that a search finds.
+/// Experiments that others hold, in other processes or on other machines, as one model of all of them sees them: OE,
+/// ARMAX, Box-Jenkins, or any other that a search finds.
 ///
-/// Each holder describes its experiments with [`new`](Self::new), descriptions are [merged](Self::merge), every holder takes the
-/// [offsets](Self::offsets) of all from its channels ([`deviations`](Self::deviations)), and the [fit](Self::fit) asks all of them at once for sums over their rows
-/// ([`answer`](Self::answer)): the cost, its gradient and its Gram matrix at the point where the search stands. The estimate is the one that
-/// [`identify`](super::identify()) finds in the joined log, but for the order in which sums are added. Starts are found in some rows of all:
-/// logs of fewer than [`FETCHED_BELOW`](Self::FETCHED_BELOW) rows together are fetched whole.
+/// Each holder describes its experiments with [`new`](Self::new), descriptions are [merged](Self::merge), every holder
+/// takes the [offsets](Self::offsets) of all from its channels ([`deviations`](Self::deviations)), and the
+/// [fit](Self::fit) asks all of them at once for sums over their rows ([`answer`](Self::answer)): the cost, its
+/// gradient and its Gram matrix at the point where the search stands. The estimate is the one that
+/// [`identify`](super::identify()) finds in the joined log, but for the order in which sums are added. Starts are found
+/// in some rows of all: logs of fewer than [`FETCHED_BELOW`](Self::FETCHED_BELOW) rows together are fetched whole.
 ///
 /// ```text
 /// J = sum e^2,   g = sum psi e,   G = sum psi psi',   psi = -de/dtheta
 /// ```
 ///
-/// over all samples of all experiments, with psi less what the initial conditions of its experiment explain of it (Ljung, System
-/// Identification, 2nd ed. 1999, section 10.2). Each holder's work in an iteration is O(N p) for its N rows, and p^2 + n (p + 1) numbers come from it, for n initial conditions.
+/// over all samples of all experiments, with psi less what the initial conditions of its experiment explain of it
+/// (Ljung, System Identification, 2nd ed. 1999, section 10.2). Each holder's work in an iteration is O(N p) for its N
+/// rows, and p^2 + n (p + 1) numbers come from it, for n initial conditions.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};
@@ -102,8 +104,8 @@ impl Experiments {
     /// Those of a log, which may be [joined](Log::join) of several.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a plan that asks for more than a search on all rows; [`Error::Data`] for a channel that is not there,
-    /// or if no row has a value in every channel.
+    /// [`Error::Argument`] for a plan that asks for more than a search on all rows; [`Error::Data`] for a channel that
+    /// is not there, or if no row has a value in every channel.
     pub fn new(log: &Log, sources: &[Source], plan: &Plan) -> Result<Self, Error> {
         let orders = searched(plan)?;
         let names = channels(log, plan)?;
@@ -132,8 +134,8 @@ impl Experiments {
     /// Adds those of other holders after these.
     ///
     /// # Errors
-    /// After which nothing has changed. [`Error::Data`] if they have other channels, sample times that differ by more than 1 %, or one of
-    /// the logs that are there.
+    /// After which nothing has changed. [`Error::Data`] if they have other channels, sample times that differ by more
+    /// than 1 %, or one of the logs that are there.
     pub fn merge(&mut self, other: &Self) -> Result<(), Error> {
         if self.channels() != other.channels() {
             return Err(Error::data(format!(
@@ -202,7 +204,8 @@ impl Experiments {
         seen_by_starts(&self.segments()).is_none()
     }
 
-    /// What is to be taken from each channel, the inputs first: its mean over all experiments, what is set by hand, or nothing.
+    /// What is to be taken from each channel, the inputs first: its mean over all experiments, what is set by hand, or
+    /// nothing.
     ///
     /// # Errors
     /// [`Error::Undetermined`] for an input or an output that is constant.
@@ -219,8 +222,8 @@ impl Experiments {
         each.collect()
     }
 
-    /// Searches for the model, with the figures that need no second pass over the data: the fit one step ahead on the rows of the fit.
-    /// The holders have [`deviations`](Self::deviations).
+    /// Searches for the model, with the figures that need no second pass over the data: the fit one step ahead on the
+    /// rows of the fit. The holders have [`deviations`](Self::deviations).
     ///
     /// # Errors
     /// As for [`identify`](super::identify()), and what `ask` says.

@@ -39,7 +39,8 @@ pub(super) fn estimation_record<'l>(
     log.record(inputs, output, rows)
 }
 
-/// Whether an estimate of least squared errors goes on through missing outputs. From zeros, rows of least squares begin anew.
+/// Whether an estimate of least squared errors goes on through missing outputs. From zeros, rows of least squares begin
+/// anew.
 pub(super) fn goes_through(orders: &Orders, initial: Initial) -> bool {
     !orders.needs_past_outputs() && (orders.has_f() || initial != Initial::Zero)
 }

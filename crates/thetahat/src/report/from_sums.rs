@@ -11,8 +11,8 @@ use crate::respond::{Horizon, InitialCondition};
 use crate::validate::{Fit, Part};
 use crate::{Document, Error};
 
-/// That of a model of polynomials of some channels, the inputs first, less their offsets. `spread` is the root of the sum of squares of
-/// the output about its mean, over the samples that count.
+/// That of a model of polynomials of some channels, the inputs first, less their offsets. `spread` is the root of the
+/// sum of squares of the output about its mean, over the samples that count.
 pub(super) fn report_of(
     data: Data,
     fitted: &Fitted,

@@ -17,9 +17,9 @@ use crate::respond::Horizon;
 /// The rows that a choice was made on are cut into this many parts, of which the last is held out.
 const PARTS: usize = 3;
 
-/// Where a choice found one model for prediction and another for simulation, or took a process or a model in state space: these, by name, fitted to the first
-/// two thirds of the rows that it was made on, and evaluated on the last third of `log`. None where there was no such choice, and
-/// none of a model that these rows do not determine.
+/// Where a choice found one model for prediction and another for simulation, or took a process or a model in state
+/// space: these, by name, fitted to the first two thirds of the rows that it was made on, and evaluated on the last
+/// third of `log`. None where there was no such choice, and none of a model that these rows do not determine.
 ///
 /// Cost: a fit of each.
 ///

@@ -372,7 +372,8 @@ pub(super) fn channels<'p>(log: &Log, plan: &'p Plan) -> Result<Vec<&'p str>, Er
     Ok(names)
 }
 
-/// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is needed.
+/// The record that models of these orders are fitted to: it goes on through missing outputs where no past one is
+/// needed.
 pub(super) fn estimation_rows<'l>(
     log: &'l Log,
     plan: &Plan,
@@ -417,8 +418,8 @@ impl<'l> Rivals<'l> {
     }
 }
 
-/// A choice, whether all models had a constant, and the process, the order of the model in state space or the report of the nonlinear
-/// one that is taken instead, if one is.
+/// A choice, whether all models had a constant, and the process, the order of the model in state space or the report of
+/// the nonlinear one that is taken instead, if one is.
 struct Chosen {
     found: SelectedModel,
     with_constant: bool,
@@ -489,8 +490,8 @@ fn selected<'a>(
     Ok(Chosen { found, with_constant, process, order, nonlinear })
 }
 
-/// The choice without a search for delays where all inputs are sums of few sinusoids, which do not tell one delay from another; and what is to
-/// be said of that.
+/// The choice without a search for delays where all inputs are sums of few sinusoids, which do not tell one delay from
+/// another; and what is to be said of that.
 fn without_delays<'c>(
     choice: &'c Choice,
     record: &Record<'_>,
@@ -617,7 +618,8 @@ fn parameters_of(input: Option<usize>, orders: &Orders) -> Vec<String> {
     [&names[b..b + orders.nb[input]], &names[f..f + orders.nf[input]]].concat()
 }
 
-/// How the parameters were found, and what was found beside them: as it is measured from zero, where `taken` was taken before.
+/// How the parameters were found, and what was found beside them: as it is measured from zero, where `taken` was taken
+/// before.
 pub(super) fn estimation_of(fitted: &Fitted, taken: Offset) -> Estimation {
     let Fitted { estimate, criteria, offset, .. } = fitted;
     let above = |base: f64, found: Quantity| Quantity { value: base + found.value, ..found };

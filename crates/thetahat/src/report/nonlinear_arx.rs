@@ -184,7 +184,8 @@ pub(super) fn with_expressions<'l>(
     Ok(whole)
 }
 
-/// What channels are divided by, each with its role: the standard deviation over the estimation rows; 1 in the signals' own units.
+/// What channels are divided by, each with its role: the standard deviation over the estimation rows; 1 in the signals'
+/// own units.
 fn scales<'l>(
     log: &'l Log,
     signals: &BTreeMap<String, Signal>,

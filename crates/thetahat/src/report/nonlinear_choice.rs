@@ -20,13 +20,14 @@ use crate::validate::{Fit, Part};
 /// What is tried beside a linear model: degrees of products, and units of networks.
 const DEGREES: [usize; 2] = [2, 3];
 const UNITS: [usize; 2] = [2, 4];
-/// Of a time limit the choice of a linear model may take the first part, all models together the second; the rest is for the last fit.
+/// Of a time limit the choice of a linear model may take the first part, all models together the second; the rest is
+/// for the last fit.
 const FOR_LINEAR: f64 = 0.2;
 const FOR_ALL: f64 = 0.6;
 /// A simpler model is taken if its error on held-out rows is no more than this many times the least.
 const CLEARLY: f64 = 1.1;
-/// A model whose run leaves this many times the measured range, about its middle, is taken only where all do. Good models of plants that
-/// saturate leave 1.1 times, within which a choice of terms prefers to stay.
+/// A model whose run leaves this many times the measured range, about its middle, is taken only where all do. Good
+/// models of plants that saturate leave 1.1 times, within which a choice of terms prefers to stay.
 const RANGE: f64 = 2.0;
 
 /// A model that was tried.
@@ -52,20 +53,21 @@ struct Parts<'l> {
 /// y(t) = sum_j theta_j f_j(z(t)) + e(t)
 /// ```
 ///
-/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are functions of the plan's map.
-/// Of functions that are known forward regression chooses: the one that explains most of what is left comes next (Chen, Billings and Luo, Int. J. Control 50,
-/// 1989). Products are chosen from moments, without a matrix of all of them, and the parameters come from a QR of the chosen ones; their
-/// covariance is that of a linear regression with white noise. How many are taken is what the free run says of rows that they were not
-/// fitted to, an information criterion, or given. Functions with numbers of their own, such as the weights of a network, are trained: a
-/// search from several starts for the least errors of free runs, or of shorter ones.
+/// where z are lags of the output and of the inputs, each less its offset and divided by its scale, and f_j are
+/// functions of the plan's map. Of functions that are known forward regression chooses: the one that explains most of
+/// what is left comes next (Chen, Billings and Luo, Int. J. Control 50, 1989). Products are chosen from moments,
+/// without a matrix of all of them, and the parameters come from a QR of the chosen ones; their covariance is that of a
+/// linear regression with white noise. How many are taken is what the free run says of rows that they were not fitted
+/// to, an information criterion, or given. Functions with numbers of their own, such as the weights of a network, are
+/// trained: a search from several starts for the least errors of free runs, or of shorter ones.
 ///
-/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions; of a training
-/// O(N (p^2 + na p)) for each iteration on p numbers.
+/// Cost: O(N C(n + 2 d, 2 d)) for products of degree d of n regressors, and O(M K^2) for K of M functions; of a
+/// training O(N (p^2 + na p)) for each iteration on p numbers.
 ///
 /// # Errors
-/// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are not there, an
-/// irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is constant, or
-/// functions depend on one another.
+/// [`Error::Argument`] for a plan that makes no sense or rows that are not there; [`Error::Data`] for channels that are
+/// not there, an irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few,
+/// a channel is constant, or functions depend on one another.
 ///
 /// ```
 /// use thetahat::data::{Channel, Detrend, Log};
@@ -97,7 +99,8 @@ pub fn fit_nonlinear_arx(log: &Log, sources: &[Source], plan: &NonlinearArxPlan)
     fit_nonlinear_arx_monitored(log, sources, plan, &|_| ControlFlow::Continue(()))
 }
 
-/// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may end it.
+/// [`fit_nonlinear_arx`] that tells `monitor` of each iteration of a training, from several threads. The monitor may
+/// end it.
 ///
 /// # Errors
 /// As for [`fit_nonlinear_arx`]; [`Error::Interrupted`] if the monitor says so.
@@ -115,9 +118,10 @@ pub fn fit_nonlinear_arx_monitored(
     }
 }
 
-/// Fits the linear model that the data choose, products of two degrees, as they are and trained for longer runs, and networks of two sizes,
-/// and takes the first, in this order, whose run over held-out rows has an error of no more than 1.1 times that of the best one. Where lags
-/// are chosen each is tried with those of the plan and with those of the linear model.
+/// Fits the linear model that the data choose, products of two degrees, as they are and trained for longer runs, and
+/// networks of two sizes, and takes the first, in this order, whose run over held-out rows has an error of no more than
+/// 1.1 times that of the best one. Where lags are chosen each is tried with those of the plan and with those of the
+/// linear model.
 ///
 /// # Errors
 /// As for [`fit_nonlinear_arx`].
@@ -232,8 +236,8 @@ fn maps() -> impl Iterator<Item = MapPlan> {
     products.chain(networks)
 }
 
-/// The plan with its lags, and where lags are chosen with those of the linear model too: as many past outputs as A or F reads, and of each
-/// input those of B and the one before them, as a nonlinear plant may answer sooner.
+/// The plan with its lags, and where lags are chosen with those of the linear model too: as many past outputs as A or F
+/// reads, and of each input those of B and the one before them, as a nonlinear plant may answer sooner.
 fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan> {
     let own = NonlinearArxPlan { lags_chosen: false, ..plan.clone() };
     let mut plans = vec![own.clone()];

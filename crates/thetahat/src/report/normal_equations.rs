@@ -32,30 +32,33 @@ use border::Border;
 use nonlinear_arx::{Centred, Products, Summed, summed};
 use settings::{Kind, Settings};
 
-/// The normal equations of a model that is linear in its parameters: made from a piece of the data, added to those of other pieces,
-/// solved at the end. The JSON document `thetahat.normal-equations/1`.
+/// The normal equations of a model that is linear in its parameters: made from a piece of the data, added to those of
+/// other pieces, solved at the end. The JSON document `thetahat.normal-equations/1`.
 ///
 /// ```text
 /// S = sum_t r(t) r(t)',   r(t) = [1, y(t) … y(t-na), u_1(t-nk) …]'
 /// ```
 ///
-/// and the sums of each channel hold all that a fit by least squares asks of the data: parameters and their covariance, the noise
-/// variance, the offsets that are taken from the channels (means that are known at the end only), whether a constant is worth its
-/// parameter, the fit one step ahead. So ARX and AR models, and impulse responses with a kernel or without, come out as
-/// [`identify`](super::identify()) finds them on the joined log. ARX models with several outputs and state-space models ([`of_states`](Self::of_states)), and nonlinear ARX models of
-/// products ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
+/// and the sums of each channel hold all that a fit by least squares asks of the data: parameters and their covariance,
+/// the noise variance, the offsets that are taken from the channels (means that are known at the end only), whether a
+/// constant is worth its parameter, the fit one step ahead. So ARX and AR models, and impulse responses with a kernel
+/// or without, come out as [`identify`](super::identify()) finds them on the joined log. ARX models with several
+/// outputs and state-space models ([`of_states`](Self::of_states)), and nonlinear ARX models of products
+/// ([`of_nonlinear_arx`](Self::of_nonlinear_arx)) have sums of the same kind.
 ///
-/// Sums are in twice the precision, 32 digits, of which a condition number kappa takes 2 log10(kappa): parameters are exact to
-/// eps + 1e-29 kappa^2 (measured: 4e-16 up to kappa = 1e6), in whatever order pieces are merged. The difference to a fit in one pass is
-/// what rounding does to that: at most 4 eps (kappa + kappa^2 |r|/|theta|), see [`arx`](crate::estimate::arx).
+/// Sums are in twice the precision, 32 digits, of which a condition number kappa takes 2 log10(kappa): parameters are
+/// exact to eps + 1e-29 kappa^2 (measured: 4e-16 up to kappa = 1e6), in whatever order pieces are merged. The
+/// difference to a fit in one pass is what rounding does to that: at most 4 eps (kappa + kappa^2 |r|/|theta|), see
+/// [`arx`](crate::estimate::arx).
 ///
-/// Pieces of one log overlap: a piece begins with as many rows of the one before it as the model reaches back to ([`lags`](Self::lags))
-/// at least, which say nothing by themselves (`past`). They are compared with the rows that came before when pieces are merged.
-/// Experiments have no past. Gaps in a piece, and missing samples, are gaps as in a log.
+/// Pieces of one log overlap: a piece begins with as many rows of the one before it as the model reaches back to
+/// ([`lags`](Self::lags)) at least, which say nothing by themselves (`past`). They are compared with the rows that came
+/// before when pieces are merged. Experiments have no past. Gaps in a piece, and missing samples, are gaps as in a log.
 ///
 /// Cost: O(N p) time for N rows and p parameters; O(p^2) memory, and a few numbers for each piece and gap.
 ///
-/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, section 2.2; the precision is told in `regression::extended`.
+/// Source: Björck, Numerical Methods for Least Squares Problems, 1996, section 2.2; the precision is told in
+/// `regression::extended`.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log, Rows};
@@ -163,13 +166,13 @@ impl<'l> Piece<'l> {
 impl NormalEquations {
     /// Those of a piece of the data, of which the first `past` rows are of the piece before it.
     ///
-    /// The plan says inputs, output, orders, offsets and constant as for [`identify`](super::identify()); it gives the method too, the
-    /// default or [`Method::Regularised`](crate::estimate::Method::Regularised).
+    /// The plan says inputs, output, orders, offsets and constant as for [`identify`](super::identify()); it gives the
+    /// method too, the default or [`Method::Regularised`](crate::estimate::Method::Regularised).
     ///
     /// # Errors
-    /// [`Error::Argument`] for a plan that asks for more than least squares on all rows, and a past that is shorter than
-    /// [`lags`](Self::lags) or is the whole piece; [`Error::Data`] for a channel that is not there, and if squares leave the range of
-    /// numbers.
+    /// [`Error::Argument`] for a plan that asks for more than least squares on all rows, and a past that is shorter
+    /// than [`lags`](Self::lags) or is the whole piece; [`Error::Data`] for a channel that is not there, and if squares
+    /// leave the range of numbers.
     pub fn new(log: &Log, sources: &[Source], plan: &Plan, past: usize) -> Result<Self, Error> {
         let settings = Settings::of(plan)?;
         let Kind::Linear { orders, .. } = &settings.kind else {
@@ -186,20 +189,21 @@ impl NormalEquations {
 
     /// Those of a state-space model, or an ARX model, with several outputs.
     ///
-    /// The plan says the channels, [`arx`](StateSpacePlan::arx) or the options of a subspace method, delays, offsets and constant as for
-    /// [`fit_state_space`](super::fit_state_space()). Products of all lags of all signals are the normal equations of every order: orders and
-    /// coupling may be ranges, of which the least MDL chooses when the model is solved for. That is done as in a fit to the whole, in 16
-    /// digits: to eps kappa^2.
+    /// The plan says the channels, [`arx`](StateSpacePlan::arx) or the options of a subspace method, delays, offsets
+    /// and constant as for [`fit_state_space`](super::fit_state_space()). Products of all lags of all signals are the
+    /// normal equations of every order: orders and coupling may be ranges, of which the least MDL chooses when the
+    /// model is solved for. That is done as in a fit to the whole, in 16 digits: to eps kappa^2.
     ///
-    /// The matrices of a subspace method are those of the whole too, the past that the least AIC chooses among them: the first samples of each
-    /// segment are kept, as many as there are lags. What is not the same are its errors: they are those of samples that have its past and
-    /// 10 more before them, and their predictor starts at the states that this past says, where the fit to the whole runs along each segment
-    /// from the state that explains it best. So the noise covariance differs by some errors at the starts of segments, and the order of
-    /// the least MDL may, where two are nearly as good. A search behind it would read the data again.
+    /// The matrices of a subspace method are those of the whole too, the past that the least AIC chooses among them:
+    /// the first samples of each segment are kept, as many as there are lags. What is not the same are its errors: they
+    /// are those of samples that have its past and 10 more before them, and their predictor starts at the states that
+    /// this past says, where the fit to the whole runs along each segment from the state that explains it best. So the
+    /// noise covariance differs by some errors at the starts of segments, and the order of the least MDL may, where two
+    /// are nearly as good. A search behind it would read the data again.
     ///
     /// # Errors
-    /// As for [`new`](Self::new); [`Error::Argument`] for a search behind a subspace method, and a range of delays of an ARX model, whose
-    /// models are of other rows.
+    /// As for [`new`](Self::new); [`Error::Argument`] for a search behind a subspace method, and a range of delays of
+    /// an ARX model, whose models are of other rows.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Rows};
@@ -260,18 +264,20 @@ impl NormalEquations {
         Ok(Self { starts, ..made })
     }
 
-    /// Those of a nonlinear ARX model of products with one output: those that are named, [`MapPlan::Products`](super::MapPlan::Products), or
-    /// as many as are asked for, or have the least of an information criterion, of those up to a degree,
-    /// [`MapPlan::Polynomial`](super::MapPlan::Polynomial). Forward regression needs no more than their sums.
+    /// Those of a nonlinear ARX model of products with one output: those that are named,
+    /// [`MapPlan::Products`](super::MapPlan::Products), or as many as are asked for, or have the least of an
+    /// information criterion, of those up to a degree, [`MapPlan::Polynomial`](super::MapPlan::Polynomial). Forward
+    /// regression needs no more than their sums.
     ///
-    /// The plan says channels, lags, expressions, products, offsets and units as for [`fit_nonlinear_arx`](super::fit_nonlinear_arx()). The sums are of
-    /// the products and of all parts of them about the means of the piece: so they can be moved to those of all pieces, which are known
-    /// at the end, as are the standard deviations that signals are divided by. A product of a row is rounded as it is in a fit to the whole:
+    /// The plan says channels, lags, expressions, products, offsets and units as for
+    /// [`fit_nonlinear_arx`](super::fit_nonlinear_arx()). The sums are of the products and of all parts of them about
+    /// the means of the piece: so they can be moved to those of all pieces, which are known at the end, as are the
+    /// standard deviations that signals are divided by. A product of a row is rounded as it is in a fit to the whole:
     /// parameters are exact to eps kappa. O(N M^2) time for M products and parts, 1000 at most.
     ///
     /// # Errors
-    /// As for [`new`](Self::new); [`Error::Argument`] for functions whose centres, knots or weights are found from the samples, for products
-    /// of which free runs say how many, and for several outputs.
+    /// As for [`new`](Self::new); [`Error::Argument`] for functions whose centres, knots or weights are found from the
+    /// samples, for products of which free runs say how many, and for several outputs.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Rows};
@@ -358,9 +364,9 @@ impl NormalEquations {
     /// Adds those of the pieces that come after these. O(p^2).
     ///
     /// # Errors
-    /// After which nothing has changed. [`Error::Argument`] if they are of other channels, orders or settings; [`Error::Data`] if a
-    /// piece is among both, the sample times differ by more than 1 %, the past of the others is not what these end with, or their
-    /// clock goes back.
+    /// After which nothing has changed. [`Error::Argument`] if they are of other channels, orders or settings;
+    /// [`Error::Data`] if a piece is among both, the sample times differ by more than 1 %, the past of the others is
+    /// not what these end with, or their clock goes back.
     pub fn merge(&mut self, other: &Self) -> Result<(), Error> {
         self.settings.check_same(&other.settings)?;
         if (other.sample_time / self.sample_time - 1.0).abs() > 0.01 {
@@ -425,11 +431,12 @@ impl NormalEquations {
         Ok(())
     }
 
-    /// The model, with the figures that need no second pass over the data: of its fit, that one step ahead on the rows of the fit.
+    /// The model, with the figures that need no second pass over the data: of its fit, that one step ahead on the rows
+    /// of the fit.
     ///
     /// # Errors
-    /// As for [`identify`](super::identify()) and [`fit_state_space`](super::fit_state_space()): [`Error::Undetermined`] if the data cannot
-    /// determine the parameters, which are named.
+    /// As for [`identify`](super::identify()) and [`fit_state_space`](super::fit_state_space()):
+    /// [`Error::Undetermined`] if the data cannot determine the parameters, which are named.
     pub fn solve(&self) -> Result<Report, Error> {
         match &self.settings.kind {
             Kind::Linear { orders, kernel, .. } => linear::solve(self, orders, *kernel),

@@ -17,8 +17,8 @@ pub struct Plan {
     pub estimate: Vec<Rows>,
     /// Rows to validate on.
     pub validate: Vec<Rows>,
-    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again
-    /// to the first two, and evaluated on the third. None: all rows to estimate on serve for the fit.
+    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is
+    /// fitted again to the first two, and evaluated on the third. None: all rows to estimate on serve for the fit.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -37,13 +37,14 @@ pub struct Plan {
     pub method: Method,
     /// What stands for the samples before a segment.
     pub initial: Initial,
-    /// Whether the level of the output is estimated with the parameters: where the output would stay if the inputs stayed at
-    /// their offsets. A mean is not it where a log begins or ends far from there, as that of a step test. Auto leaves alone what
-    /// was given: nothing is taken with [`Detrend::None`], and what is set by hand stays.
+    /// Whether the level of the output is estimated with the parameters: where the output would stay if the inputs
+    /// stayed at their offsets. A mean is not it where a log begins or ends far from there, as that of a step test.
+    /// Auto leaves alone what was given: nothing is taken with [`Detrend::None`], and what is set by hand stays.
     pub constant: Constant,
     /// Whether a slope of the output is estimated with the parameters, and the level with it.
     pub trend: bool,
-    /// Whether outliers of the output count as other values do. Where the data choose the orders they are taken for missing otherwise.
+    /// Whether outliers of the output count as other values do. Where the data choose the orders they are taken for
+    /// missing otherwise.
     pub uses_outliers: bool,
 }
 
@@ -75,8 +76,8 @@ impl Plan {
         self.detrend != Detrend::None && !self.offsets.iter().any(|(name, _)| *name == self.output)
     }
 
-    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by hand, and one
-    /// of which a band counts.
+    /// Whether a constant is estimated: auto leaves alone the output of which the offset was given, as nothing or by
+    /// hand, and one of which a band counts.
     pub(super) fn constant(&self) -> Constant {
         let given = !self.takes_output_offset() || self.prefilter.is_some();
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }

@@ -40,8 +40,8 @@ pub struct ProcessPlan {
     pub offsets: Vec<(String, f64)>,
     /// Whether the output has a slope of its own, in its units per second.
     pub trend: bool,
-    /// Whether each log begins in a state that is estimated, or at rest. None: at rest, unless a state explains more than a tenth of the
-    /// squared errors.
+    /// Whether each log begins in a state that is estimated, or at rest. None: at rest, unless a state explains more
+    /// than a tenth of the squared errors.
     pub free_start: Option<bool>,
     /// How to search; `starts` are further points of the grid, `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
@@ -83,8 +83,8 @@ impl ProcessPlan {
     /// Whether the plan makes sense, whatever the log.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is no input, a name comes twice, there are structures for other inputs, or an offset is of another
-    /// channel or not finite.
+    /// [`Error::Argument`] if there is no input, a name comes twice, there are structures for other inputs, or an
+    /// offset is of another channel or not finite.
     pub fn check(&self) -> Result<(), Error> {
         if self.inputs.is_empty() {
             return Err(Error::argument("input", "a process has one input at least"));
@@ -150,31 +150,33 @@ impl ProcessPlan {
 /// y(t) = y0 + m t + sum_j G_j(s) (u_j(t) - u_j0) + e(t),   G(s) = K (1 + tau_z s)/(s (1 + tau1 s)(1 + tau2 s)…) e^(-theta s)
 /// ```
 ///
-/// with the factors that the [structure](ProcessStructure) of an input has. The sum of e^2 over the measured outputs is as small as can
-/// be: gains, y0 and m follow for each shape and dead time (variable projection, Golub and Pereyra 1973), which a Levenberg-Marquardt
-/// search finds from a grid. Transfer functions (`tf`) are searched for from refined instrumental variables in continuous time (SRIVC).
+/// with the factors that the [structure](ProcessStructure) of an input has. The sum of e^2 over the measured outputs is
+/// as small as can be: gains, y0 and m follow for each shape and dead time (variable projection, Golub and Pereyra
+/// 1973), which a Levenberg-Marquardt search finds from a grid. Transfer functions (`tf`) are searched for from refined
+/// instrumental variables in continuous time (SRIVC).
 ///
-/// **Inputs** are held from each row to the next, and the response is exact at the times of the rows: the clock may be irregular
-/// ([`Log::recorded`]), and a dead time need not be a number of samples. A missing input holds the value before it, a missing output
-/// is left out.
+/// **Inputs** are held from each row to the next, and the response is exact at the times of the rows: the clock may be
+/// irregular ([`Log::recorded`]), and a dead time need not be a number of samples. A missing input holds the value
+/// before it, a missing output is left out.
 ///
-/// **Start.** The process is at rest in the first row of each log, with the inputs of that row, which are the offsets u_j0 unless others
-/// are given. With `free_start`, and where nothing was said and a state explains more than a tenth of the squared errors, each log has a state
-/// of its own; beside a single step that is nearly the same as the step. The output of an
-/// integrator then has a slope too, since an input that is not at rest moves it at a rate of its own, unless the offset of the input is given.
+/// **Start.** The process is at rest in the first row of each log, with the inputs of that row, which are the offsets
+/// u_j0 unless others are given. With `free_start`, and where nothing was said and a state explains more than a tenth
+/// of the squared errors, each log has a state of its own; beside a single step that is nearly the same as the step.
+/// The output of an integrator then has a slope too, since an input that is not at rest moves it at a rate of its own,
+/// unless the offset of the input is given.
 ///
-/// **Standard errors** are for errors of any colour, that of an autoregression of the residuals. Those for white errors, which are
-/// far too small for most plants, stand in [`ProcessOutcome`](crate::estimate::ProcessOutcome).
+/// **Standard errors** are for errors of any colour, that of an autoregression of the residuals. Those for white
+/// errors, which are far too small for most plants, stand in [`ProcessOutcome`](crate::estimate::ProcessOutcome).
 ///
 /// An iteration costs O(N p^2) for p parameters.
 ///
-/// Source: Ljung, System Identification, 2nd ed. 1999, sections 4.3, 9.3 and 10.2; Golub and Pereyra, SIAM J. Numerical Analysis 10
-/// (1973); Kaufman, BIT 15 (1975); Young and Jakeman, Int. J. Control 31 (1980).
+/// Source: Ljung, System Identification, 2nd ed. 1999, sections 4.3, 9.3 and 10.2; Golub and Pereyra, SIAM J. Numerical
+/// Analysis 10 (1973); Kaufman, BIT 15 (1975); Young and Jakeman, Int. J. Control 31 (1980).
 ///
 /// # Errors
-/// [`Error::Argument`] as for [`ProcessPlan::check`], and for rows that are not there; [`Error::Data`] if a channel is not there or
-/// squares leave the range of numbers; [`Error::Undetermined`] for an input that never changes, too few values, and parameters that
-/// the log does not determine; [`Error::Interrupted`] if the monitor says so.
+/// [`Error::Argument`] as for [`ProcessPlan::check`], and for rows that are not there; [`Error::Data`] if a channel is
+/// not there or squares leave the range of numbers; [`Error::Undetermined`] for an input that never changes, too few
+/// values, and parameters that the log does not determine; [`Error::Interrupted`] if the monitor says so.
 ///
 /// ```
 /// use std::ops::ControlFlow;

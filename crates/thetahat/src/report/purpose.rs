@@ -111,7 +111,8 @@ fn held_out(report: &Report) -> Option<(f64, &'static str)> {
     seen.as_ref().map(HeldOut::percent).map(|percent| (percent, "on held-out blocks"))
 }
 
-/// In which band of frequencies the responses from all inputs to all outputs are known; none where no errors of parameters are.
+/// In which band of frequencies the responses from all inputs to all outputs are known; none where no errors of
+/// parameters are.
 #[expect(clippy::option_option, reason = "no errors, and no frequency that is known, are two things")]
 fn band(linear: &[LinearModel<'_>]) -> Option<Option<String>> {
     let highest = PI / linear.first()?.sample_time();

@@ -7,20 +7,23 @@ use crate::figures::number;
 use crate::model::{Signal, StateSpaceModel};
 
 impl Report {
-    /// The Hankel singular values of its model, falling: see [`StateSpace::hankel_singular_values`].
+    /// The Hankel singular values of its model, falling: see
+    /// [`StateSpace::hankel_singular_values`](crate::model::StateSpace::hankel_singular_values).
     ///
     /// # Errors
     /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for
-    /// [`StateSpace::hankel_singular_values`].
+    /// [`StateSpace::hankel_singular_values`](crate::model::StateSpace::hankel_singular_values).
     pub fn hankel_singular_values(&self) -> Result<Vec<f64>, Error> {
         self.model.innovations_form()?.hankel_singular_values()
     }
 
-    /// The report with a model of so many states by balanced truncation, and a bound of what that does to the frequency response: see
-    /// [`StateSpace::reduced`]. It keeps what it says of the data, and has no figures of a fit: validate it.
+    /// The report with a model of so many states by balanced truncation, and a bound of what that does to the frequency
+    /// response: see [`StateSpace::reduced`](crate::model::StateSpace::reduced). It keeps what it says of the data, and
+    /// has no figures of a fit: validate it.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for [`StateSpace::reduced`].
+    /// [`Error::Argument`] for a model that is neither in state space nor of polynomials; as for
+    /// [`StateSpace::reduced`](crate::model::StateSpace::reduced).
     ///
     /// ```
     /// use thetahat::data::{Channel, Log};

@@ -29,7 +29,8 @@ const LEVEL: f64 = 0.95;
 pub struct Requirement {
     /// What is asked.
     pub demand: Demand,
-    /// The output it is asked of, written between brackets behind the first word, such as `fit[y2]@5>=80`; none: of each.
+    /// The output it is asked of, written between brackets behind the first word, such as `fit[y2]@5>=80`; none: of
+    /// each.
     pub output: Option<String>,
 }
 
@@ -44,7 +45,8 @@ impl From<Demand> for Requirement {
 pub enum Demand {
     /// `white`: Ljung and Box's test does not reject white residuals.
     White,
-    /// `independent`: no test says that residuals depend on a past input. The level is shared among the inputs (Bonferroni).
+    /// `independent`: no test says that residuals depend on a past input. The level is shared among the inputs
+    /// (Bonferroni).
     Independent,
     /// `stable`: all poles lie inside the unit circle.
     Stable,
@@ -185,8 +187,8 @@ impl Requirement {
     /// Whether it can be asked of a model at all.
     ///
     /// # Errors
-    /// [`Error::Argument`] for white residuals of a model that says nothing of the noise, for independence of inputs that there are not,
-    /// and for an output that the model does not have.
+    /// [`Error::Argument`] for white residuals of a model that says nothing of the noise, for independence of inputs
+    /// that there are not, and for an output that the model does not have.
     pub fn check(&self, report: &Report) -> Result<(), Error> {
         let names = || report.model.outputs().iter().map(|output| output.name.as_str());
         if let Some(output) = &self.output
@@ -201,8 +203,8 @@ impl Requirement {
         self.demand.check(report)
     }
 
-    /// What is missing, in words with the figure; none where it is met. What cannot be told is not met. Tests reject below
-    /// `alpha`.
+    /// What is missing, in words with the figure; none where it is met. What cannot be told is not met. Tests reject
+    /// below `alpha`.
     pub fn unmet(&self, validation: &Validation, alpha: f64) -> Option<String> {
         let Some(name) = &self.output else {
             return self.demand.missing(validation, alpha).map(|missing| format!("{self}: {missing}"));
@@ -365,7 +367,8 @@ fn of_fits(
     each.collect()
 }
 
-/// The figures this many steps ahead, of each output; without a number of the free run, or one step ahead of a model without inputs.
+/// The figures this many steps ahead, of each output; without a number of the free run, or one step ahead of a model
+/// without inputs.
 fn figures(validation: &Validation, steps: Option<usize>) -> (Vec<&Fit>, Horizon) {
     let horizon = match steps {
         None if validation.driven => Horizon::FreeRun,

@@ -10,9 +10,10 @@ use crate::validate::{Fit, Part};
 const MOST: usize = 64;
 
 impl Report {
-    /// What a table of many models says of this one: what it is called and was fitted to, how well it fits, static gains and the
-    /// longest time constant with their standard errors, and then the parameters with theirs, unless there are more than 64.
-    /// Cells without a value are left out. A figure of one output among several, or of one input, ends with its name.
+    /// What a table of many models says of this one: what it is called and was fitted to, how well it fits, static
+    /// gains and the longest time constant with their standard errors, and then the parameters with theirs, unless
+    /// there are more than 64. Cells without a value are left out. A figure of one output among several, or of one
+    /// input, ends with its name.
     ///
     /// ```
     /// use thetahat::Cell;
@@ -51,9 +52,10 @@ impl Report {
 }
 
 impl Validation {
-    /// What a table of many validations says of this one: how well the model fits, one step ahead, some steps ahead and in a free
-    /// run, the p-values of the tests of its residuals, its errors over those it expects, and how often its 95 % intervals hold one
-    /// step ahead. Cells without a value are left out. A figure of one output among several, or of one input, ends with its name.
+    /// What a table of many validations says of this one: how well the model fits, one step ahead, some steps ahead and
+    /// in a free run, the p-values of the tests of its residuals, its errors over those it expects, and how often its
+    /// 95 % intervals hold one step ahead. Cells without a value are left out. A figure of one output among several, or
+    /// of one input, ends with its name.
     pub fn row(&self) -> Row {
         let mut row = Row::default();
         row.text("model", &self.model);

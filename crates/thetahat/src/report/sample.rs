@@ -6,9 +6,11 @@ use crate::respond::{Drawn, Draws, Horizon, InitialCondition, draw, record_for};
 
 /// Free runs of a model on a log, drawn from what the estimate leaves open.
 ///
-/// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and before
-/// a start. But for [`InitialCondition::Drop`], which begins anew from measured outputs, they go on where the output alone is missing. `rows` are those to respond to; none: all. Offsets are as for [`apply`](crate::report::apply), and a log without the output
-/// does for [`InitialCondition::Zero`]. [`Drawn::bands`] gives the mean and quantiles of each row.
+/// They are in the log's own units, with a value for each row of the log; NaN outside the rows asked for, in gaps, and
+/// before a start. But for [`InitialCondition::Drop`], which begins anew from measured outputs, they go on where the
+/// output alone is missing. `rows` are those to respond to; none: all. Offsets are as for
+/// [`apply`](crate::report::apply), and a log without the output does for [`InitialCondition::Zero`]. [`Drawn::bands`]
+/// gives the mean and quantiles of each row.
 ///
 /// # Errors
 /// As for [`apply`](crate::report::apply) and [`draw`].

@@ -46,8 +46,9 @@ pub struct Report {
 pub struct Data {
     /// The logs in their order, with the rows that each has among all of them. A log is a segment of its own at least.
     pub logs: Vec<Source>,
-    /// Of each log, a digest of the values of each of the model's channels in the rows asked for to estimate on, and of where they stand
-    /// in it: 32 hexadecimal digits of XXH3. Empty for a log that has none of these rows. By them the rows of a fit are recognised.
+    /// Of each log, a digest of the values of each of the model's channels in the rows asked for to estimate on, and of
+    /// where they stand in it: 32 hexadecimal digits of XXH3. Empty for a log that has none of these rows. By them the
+    /// rows of a fit are recognised.
     pub digests: Vec<BTreeMap<String, String>>,
     /// The number of rows of all logs, after resampling.
     pub rows: usize,
@@ -100,13 +101,13 @@ pub struct Estimation {
     /// How the estimate was found.
     #[serde(flatten)]
     pub procedure: Procedure,
-    /// What stood for the samples before the first of a segment; none for models in equations, which say themselves what is known of
-    /// their states there.
+    /// What stood for the samples before the first of a segment; none for models in equations, which say themselves
+    /// what is known of their states there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub initial: Option<Initial>,
-    /// The output's level in its own units where the inputs are at their offsets, if it was estimated with the parameters; with
-    /// a trend that in the middle of the estimation rows. It is part of the model's offset of the output, and one of the
-    /// parameters that the criteria count.
+    /// The output's level in its own units where the inputs are at their offsets, if it was estimated with the
+    /// parameters; with a trend that in the middle of the estimation rows. It is part of the model's offset of the
+    /// output, and one of the parameters that the criteria count.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level: Option<Quantity>,
     /// The output's slope in its units per second, if it was estimated with the parameters.
@@ -114,13 +115,14 @@ pub struct Estimation {
     pub slope: Option<Quantity>,
     /// N, the samples that count.
     pub samples: usize,
-    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, with f the variances of innovations over var e; for
-    /// models in equations that over all values of all outputs.
+    /// The mean of e^2 over these samples; for exact likelihood that of v^2/f, with f the variances of innovations over
+    /// var e; for models in equations that over all values of all outputs.
     pub mse: f64,
     /// Information criteria, those that are logarithms for each sample; for a largest likelihood of that.
     #[serde(flatten)]
     pub criteria: Criteria,
-    /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are dependent.
+    /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are
+    /// dependent.
     pub condition: Option<f64>,
 }
 

@@ -37,7 +37,8 @@ impl Shares {
         Ok(Self { estimation: fitted, validation, parts: Some(parts) })
     }
 
-    /// What a fit to these rows of a log was made to: `segments` are the rows of it without a gap, `detrend` says how offsets were found.
+    /// What a fit to these rows of a log was made to: `segments` are the rows of it without a gap, `detrend` says how
+    /// offsets were found.
     ///
     /// # Errors
     /// [`Error::Data`] for a channel that is not there.

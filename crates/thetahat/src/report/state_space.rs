@@ -40,17 +40,17 @@ pub struct StateSpacePlan {
     pub orders: Option<RangeInclusive<usize>>,
     /// How the states are found.
     pub subspace: SubspaceOptions,
-    /// Whether the levels of the outputs are estimated with the matrices: where the outputs would stay if the inputs stayed at their offsets.
-    /// A mean is not it where a log begins or ends far from there. Auto: where it lowers MDL, unless nothing is taken from the channels
-    /// ([`Detrend::None`]) or an output's offset is set by hand.
+    /// Whether the levels of the outputs are estimated with the matrices: where the outputs would stay if the inputs
+    /// stayed at their offsets. A mean is not it where a log begins or ends far from there. Auto: where it lowers MDL,
+    /// unless nothing is taken from the channels ([`Detrend::None`]) or an output's offset is set by hand.
     pub constant: Constant,
     /// For each input the samples that it waits before the plant sees it; none: they do not wait.
     pub delays: Vec<usize>,
-    /// An ARX model in the place of one of a subspace method, whose options then do not count; [`constant`](Self::constant) decides on
-    /// its constant.
+    /// An ARX model in the place of one of a subspace method, whose options then do not count;
+    /// [`constant`](Self::constant) decides on its constant.
     pub arx: Option<VectorArxOptions>,
-    /// Whose errors a search makes small, from the model of the subspace method and from that of another weighting; none: there is no
-    /// search. With it poles, gains and responses have standard errors.
+    /// Whose errors a search makes small, from the model of the subspace method and from that of another weighting;
+    /// none: there is no search. With it poles, gains and responses have standard errors.
     pub refine: Option<Refine>,
     /// How to search.
     pub search: Search,
@@ -88,8 +88,8 @@ impl StateSpacePlan {
     /// Whether the plan makes sense, whatever the log.
     ///
     /// # Errors
-    /// [`Error::Argument`] for no outputs, a channel that is there twice, an empty range of orders or order 0, a past of 0, and delays that
-    /// are not one for each input.
+    /// [`Error::Argument`] for no outputs, a channel that is there twice, an empty range of orders or order 0, a past
+    /// of 0, and delays that are not one for each input.
     pub fn check(&self) -> Result<(), Error> {
         if self.outputs.is_empty() {
             return Err(Error::argument("output", "there is none; name at least one"));
@@ -143,8 +143,8 @@ impl StateSpacePlan {
         Ok(())
     }
 
-    /// How many rows before a row a model is found from: the lags of an ARX model; or the past of a subspace method, 40 where the data choose
-    /// it, and 10 more or its future, from which its errors come.
+    /// How many rows before a row a model is found from: the lags of an ARX model; or the past of a subspace method, 40
+    /// where the data choose it, and 10 more or its future, from which its errors come.
     pub fn lags(&self) -> usize {
         let late = self.delays.iter().copied().max().unwrap_or(0);
         let lags = self.arx.as_ref().map(|arx| arx.longest(self.inputs.len()));
@@ -170,22 +170,24 @@ impl StateSpacePlan {
 /// y(t)   = H x(t) + D u(t) + e(t)
 /// ```
 ///
-/// with any number of inputs and outputs by a subspace method: see [`subspace`](crate::estimate::subspace()). The order is that of least MDL, or given. Segments without a
-/// missing value are each used from their first sample on, from the state that explains it best. Predictions and free runs start so too, and go
-/// on through missing outputs: predictions by the time-varying Kalman filter of this form, whose variances have what is not known of the state.
+/// with any number of inputs and outputs by a subspace method: see [`subspace`](crate::estimate::subspace()). The order
+/// is that of least MDL, or given. Segments without a missing value are each used from their first sample on, from the
+/// state that explains it best. Predictions and free runs start so too, and go on through missing outputs: predictions
+/// by the time-varying Kalman filter of this form, whose variances have what is not known of the state.
 ///
 /// With [`arx`](StateSpacePlan::arx) the model is an ARX model with a matrix polynomial A(q), by least squares.
 ///
-/// With [`refine`](StateSpacePlan::refine) a search follows for the model of the least ln det cov e, whose e are errors one step ahead or those
-/// of the free run; all entries of the matrices move but along changes of coordinates, and poles, gains and responses have standard errors.
+/// With [`refine`](StateSpacePlan::refine) a search follows for the model of the least ln det cov e, whose e are errors
+/// one step ahead or those of the free run; all entries of the matrices move but along changes of coordinates, and
+/// poles, gains and responses have standard errors.
 ///
-/// Cost: O(N q^2 p) for q channels and a past of p samples, and O(N (n + l) (n + q)) for each order n that is looked at. An iteration of a
-/// search takes O(N r n (n + q)) for r = n (m + 2 l) directions.
+/// Cost: O(N q^2 p) for q channels and a past of p samples, and O(N (n + l) (n + q)) for each order n that is looked
+/// at. An iteration of a search takes O(N r n (n + q)) for r = n (m + 2 l) directions.
 ///
 /// # Errors
-/// [`Error::Argument`] as for [`StateSpacePlan::check`], and for rows or orders that are not there; [`Error::Data`] for channels that are
-/// not there, an irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if rows are too few, a channel is
-/// constant, outputs depend on one another, or no model has a stable predictor.
+/// [`Error::Argument`] as for [`StateSpacePlan::check`], and for rows or orders that are not there; [`Error::Data`] for
+/// channels that are not there, an irregular clock, or sums that leave the range of numbers; [`Error::Undetermined`] if
+/// rows are too few, a channel is constant, outputs depend on one another, or no model has a stable predictor.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};

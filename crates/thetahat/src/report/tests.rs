@@ -43,7 +43,8 @@ fn conditions(report: &Report) -> usize {
     }
 }
 
-/// The mean square of the errors one step ahead on the rows of the fit is that of the estimate, and its log is known again.
+/// The mean square of the errors one step ahead on the rows of the fit is that of the estimate, and its log is known
+/// again.
 fn is_consistent(report: &Report, log: &Log) {
     let orders = &report.polynomials().orders;
     let one = &report.fit[0];
@@ -136,7 +137,8 @@ fn least_squares_with_a_past_are_those_of_the_rows_behind_it() {
 
 #[test]
 fn a_leading_indicator_needs_no_shifting_by_hand() {
-    // y(t) = 4.8 q^-3/(1 - 0.7 q^-1) u(t) + (1 + 0.3 q^-1)/(1 - q^-1) e(t), u a random walk that begins far from its mean.
+    // y(t) = 4.8 q^-3/(1 - 0.7 q^-1) u(t) + (1 + 0.3 q^-1)/(1 - q^-1) e(t), u a random walk that begins far from its
+    // mean.
     let (samples, before) = (150, 60);
     let mut estimated = 0;
     for seed in 1..=6 {

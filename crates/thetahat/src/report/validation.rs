@@ -26,8 +26,8 @@ const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 const LEVELS: [f64; 4] = [0.5, 0.8, 0.95, 0.99];
 /// Fits whose samples differ by more than this fraction have no comparable criteria.
 const AS_MANY: f64 = 0.05;
-/// A mean of the errors above this fraction of their standard deviation is worth a warning, if it is as many standard errors
-/// from zero as the second number says.
+/// A mean of the errors above this fraction of their standard deviation is worth a warning, if it is as many standard
+/// errors from zero as the second number says.
 const OFF_CENTER: f64 = 0.3;
 const CERTAIN: f64 = 4.0;
 /// This share of the samples may lie outside of what a nonlinear model was fitted to.
@@ -54,7 +54,8 @@ impl Validated {
     /// The same with how the model agrees with a measured frequency response.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the model is not linear, has another sample time, or none of the channels of the response.
+    /// [`Error::Argument`] if the model is not linear, has another sample time, or none of the channels of the
+    /// response.
     pub fn over(mut self, model: &Model, response: &MeasuredResponse) -> Result<Self, Error> {
         let all = model.linear("a frequency response")?;
         let own = all.iter().find(|own| own.output().name == response.output);
@@ -164,14 +165,15 @@ impl ValidationPlan {
 
 /// Says how a stored model does on a log: fits, what is left, and whether intervals hold.
 ///
-/// Every response starts as [`Model::natural_start`] has it. The model was fitted to rows of this log if these have the values that
-/// `data.digests` of the report says, bit for bit. Of a model of several logs each is recognised by itself. Cost: O(N (L + p)) for a
-/// polynomial model, O(N k p (n^3 + m n^2)) for one in equations that looks k steps ahead.
+/// Every response starts as [`Model::natural_start`] has it. The model was fitted to rows of this log if these have the
+/// values that `data.digests` of the report says, bit for bit. Of a model of several logs each is recognised by itself.
+/// Cost: O(N (L + p)) for a polynomial model, O(N k p (n^3 + m n^2)) for one in equations that looks k steps ahead.
 ///
 /// # Errors
-/// [`Error::Data`] for channels or rows that are not there, no row with a value in every channel, a sample time that differs from the
-/// model's by more than 1 %, or a clock that it cannot follow; [`Error::Argument`] as for [`ValidationPlan::check`]. What cannot be
-/// computed of a model on a log, such as the figures of too few samples, is none in the document, with a warning that says why.
+/// [`Error::Data`] for channels or rows that are not there, no row with a value in every channel, a sample time that
+/// differs from the model's by more than 1 %, or a clock that it cannot follow; [`Error::Argument`] as for
+/// [`ValidationPlan::check`]. What cannot be computed of a model on a log, such as the figures of too few samples, is
+/// none in the document, with a warning that says why.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};
@@ -373,7 +375,8 @@ fn evaluate(on_log: &dyn OnLog, plan: &ValidationPlan, validation: &mut Validati
     evaluated
 }
 
-/// A warning where a nonlinear model read values outside of those that it was fitted to, for more than a few samples: it knows nothing of them.
+/// A warning where a nonlinear model read values outside of those that it was fitted to, for more than a few samples:
+/// it knows nothing of them.
 fn unknown_range(fits: &[Fit]) -> Option<String> {
     let shares = fits.iter().filter_map(|fit| Some((fit.outside?, fit)));
     let (share, fit) = shares.max_by(|(one, _), (other, _)| one.total_cmp(other))?;

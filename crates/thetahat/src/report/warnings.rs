@@ -130,7 +130,8 @@ fn search_warnings(search: &SearchOutcome, of_likelihood: bool) -> Vec<String> {
     warnings
 }
 
-/// A warning of a search that ended elsewhere than at a minimum, after so many iterations and with this gradient, if there is one.
+/// A warning of a search that ended elsewhere than at a minimum, after so many iterations and with this gradient, if
+/// there is one.
 fn stopped_early(stopped: Stopped, iterations: usize, gradient: Option<f64>) -> Option<String> {
     match stopped {
         Stopped::Converged => None,

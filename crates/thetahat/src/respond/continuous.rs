@@ -20,8 +20,8 @@ const ON_AXIS: f64 = 16.0 * f64::EPSILON;
 /// (C (i omega I - A)^-1 B + D) e^(-i omega delay)
 /// ```
 ///
-/// by an LU factor at each frequency, O(n^3). Of the noise it says nothing: that of continuous time has no variance. Phases are the sums of what
-/// zeros, poles and the delay turn from frequency 0 on.
+/// by an LU factor at each frequency, O(n^3). Of the noise it says nothing: that of continuous time has no variance.
+/// Phases are the sums of what zeros, poles and the delay turn from frequency 0 on.
 ///
 /// # Errors
 /// [`Error::Argument`] for a frequency that is not a number, negative, or one of a pole on the imaginary axis.
@@ -65,8 +65,8 @@ pub(super) fn frequency_response(
     Ok(names.zip(found).map(|(input, points)| FrequencyResponse { input, points }).collect())
 }
 
-/// What zeros and poles turn from frequency 0 on, as those of sampled models do: pi for a negative static gain, -pi where an unstable pole
-/// makes it so, and a pole at 0 takes pi/2 off.
+/// What zeros and poles turn from frequency 0 on, as those of sampled models do: pi for a negative static gain, -pi
+/// where an unstable pole makes it so, and a pole at 0 takes pi/2 off.
 fn turned(transfer: &ZerosPolesGain, frequency: f64) -> f64 {
     let odd =
         |roots: &[Complex<f64>]| roots.iter().filter(|root| root.im == 0.0 && root.re > 0.0).count() % 2 == 1;
@@ -86,7 +86,8 @@ fn turned(transfer: &ZerosPolesGain, frequency: f64) -> f64 {
 /// The response of an output to a step of an input at time 0, from rest: of samples that hold their input it is exact.
 ///
 /// # Errors
-/// [`Error::Argument`] if the model has no such input, or no sample is asked for; those of [`ContinuousStateSpaceModel::sampled`].
+/// [`Error::Argument`] if the model has no such input, or no sample is asked for; those of
+/// [`ContinuousStateSpaceModel::sampled`].
 pub(super) fn step_response(
     model: &ContinuousStateSpaceModel,
     pair: (usize, usize),

@@ -50,20 +50,20 @@ pub struct Drawn {
 /// y = sum_j B_j/(A F_j) u_j + C/(A D) e,   theta ~ N(theta-hat, P),   e ~ N(0, sigma^2)
 /// ```
 ///
-/// in deviations, those of the output from an offset that is drawn with theta, and from a [start](simulate) that is found for each
-/// draw. The spread of the runs is that of outputs that the
-/// plant may give to these inputs, as far as the estimate knows, to all orders in the parameters (Ljung, System Identification,
-/// 2nd ed. 1999, section 9.6, gives the first). Parameters stay where P is unknown. Those of an unstable model, where the
-/// estimate is stable, are drawn again: the normal distribution, cut off where it says what cannot be.
+/// in deviations, those of the output from an offset that is drawn with theta, and from a [start](simulate) that is
+/// found for each draw. The spread of the runs is that of outputs that the plant may give to these inputs, as far as
+/// the estimate knows, to all orders in the parameters (Ljung, System Identification, 2nd ed. 1999, section 9.6, gives
+/// the first). Parameters stay where P is unknown. Those of an unstable model, where the estimate is stable, are drawn
+/// again: the normal distribution, cut off where it says what cannot be.
 ///
-/// The noise has run before the first sample of each segment until 1 % of its slowest mode is left, at most 20000 samples;
-/// with [`InitialCondition::Zero`], and where its mode lasts, it begins there from rest.
+/// The noise has run before the first sample of each segment until 1 % of its slowest mode is left, at most 20000
+/// samples; with [`InitialCondition::Zero`], and where its mode lasts, it begins there from rest.
 ///
 /// Cost: that of [`simulate`] for each draw, on all threads; one number for each draw and sample stays in memory.
 ///
 /// # Errors
-/// As for [`simulate`]; [`Error::Argument`] for no draw or more than 100000, or more than 2^27 values; [`Error::Data`] if the
-/// estimate is so uncertain that hardly any drawn parameters are those of a stable model.
+/// As for [`simulate`]; [`Error::Argument`] for no draw or more than 100000, or more than 2^27 values; [`Error::Data`]
+/// if the estimate is so uncertain that hardly any drawn parameters are those of a stable model.
 ///
 /// ```
 /// use thetahat::data::Record;
@@ -131,9 +131,9 @@ pub fn draw(
 }
 
 impl Drawn {
-    /// The mean of the runs at each sample, and their quantiles for each of the `levels`, such as 0.025: between the two
-    /// neighbours in rank on a straight line (Hyndman and Fan 1996, definition 7). NaN where there is no run, and where one
-    /// overflows. O(N n log n) for n draws.
+    /// The mean of the runs at each sample, and their quantiles for each of the `levels`, such as 0.025: between the
+    /// two neighbours in rank on a straight line (Hyndman and Fan 1996, definition 7). NaN where there is no run, and
+    /// where one overflows. O(N n log n) for n draws.
     pub fn bands(&self, levels: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let samples = self.values.first().map_or(0, Vec::len);
         let at = |row: usize| -> Vec<f64> {

@@ -1,4 +1,5 @@
-//! What models in equations say of a log: the extended Kalman filter along it, predictions from its estimates, and free runs.
+//! What models in equations say of a log: the extended Kalman filter along it, predictions from its estimates, and free
+//! runs.
 
 mod experiment;
 mod free_run;

@@ -13,9 +13,10 @@ use crate::model::PolynomialModel;
 pub struct Forecast {
     /// y^(N+1 | N), y^(N+2 | N), …, in deviations like the record.
     pub values: Vec<f64>,
-    /// The standard deviations of their errors: what the noise does, as [`prediction_deviation`](crate::respond::prediction_deviation)
-    /// has it, and what the uncertainty of the parameters, the output's offset and the initial states adds to first order, with the factor
-    /// sqrt(nu/(nu - 2)) of Student's distribution where the noise variance was estimated with nu degrees of freedom.
+    /// The standard deviations of their errors: what the noise does, as
+    /// [`prediction_deviation`](crate::respond::prediction_deviation) has it, and what the uncertainty of the
+    /// parameters, the output's offset and the initial states adds to first order, with the factor sqrt(nu/(nu - 2)) of
+    /// Student's distribution where the noise variance was estimated with nu degrees of freedom.
     pub standard_deviations: Vec<f64>,
 }
 
@@ -29,9 +30,11 @@ pub struct Forecast {
 ///
 /// It is the mean of y(N+k) given everything up to N and the inputs (Ljung, System Identification, 2nd ed. 1999,
 /// section 3.2). `inputs[j][i]` is u_j(N+1+i). With nk samples of delay the last nk are not needed, and an input
-/// without B needs none; what is there beyond them is not read. The start is as for [`predict`](crate::respond::predict).
+/// without B needs none; what is there beyond them is not read. The start is as for
+/// [`predict`](crate::respond::predict).
 ///
-/// Cost: p + 1 times that of a prediction of the last segment, and O(steps p (na + nb + nc + nd + nf)), for p parameters.
+/// Cost: p + 1 times that of a prediction of the last segment, and O(steps p (na + nb + nc + nd + nf)), for p
+/// parameters.
 ///
 /// # Errors
 /// [`Error::Argument`] if there are fewer future inputs than needed, one is not finite, the record or `inputs` do not

@@ -41,7 +41,8 @@ pub struct FrequencyPoint {
 }
 
 impl FrequencyPoint {
-    /// A response with the covariance matrix of its real and imaginary part. Of its phases the one nearest to `near`, in radians.
+    /// A response with the covariance matrix of its real and imaginary part. Of its phases the one nearest to `near`,
+    /// in radians.
     pub(crate) fn new(
         frequency: f64,
         response: Complex<f64>,
@@ -70,8 +71,9 @@ impl FrequencyPoint {
         }
     }
 
-    /// Whether another response of this frequency, with its own covariance if it has one, lies outside of the 95 % region of this one;
-    /// none without a covariance. The region is as much larger as the interval of the phase is than 1.96 standard errors.
+    /// Whether another response of this frequency, with its own covariance if it has one, lies outside of the 95 %
+    /// region of this one; none without a covariance. The region is as much larger as the interval of the phase is than
+    /// 1.96 standard errors.
     pub fn excludes(&self, other: &Self) -> Option<bool> {
         let [[a, b], [_, c]] = self.covariance?;
         let [[p, q], [_, r]] = other.covariance.unwrap_or_default();
@@ -106,8 +108,8 @@ impl FrequencyPoint {
 /// H   = C/(A D),       dH/da_k = -H q^-k/A,   dH/dc_k = q^-k/(A D),   dH/dd_k = -H q^-k/D
 /// ```
 ///
-/// and J P J' is the covariance matrix of (re, im), P being that of the parameters (Ljung, System Identification, 2nd ed.
-/// 1999, section 9.4). There is no standard error of the magnitude and of the phase where the response is zero.
+/// and J P J' is the covariance matrix of (re, im), P being that of the parameters (Ljung, System Identification, 2nd
+/// ed. 1999, section 9.4). There is no standard error of the magnitude and of the phase where the response is zero.
 ///
 /// The phase is the sum of what the roots of the polynomials and the delay turn from frequency 0 on, so it does not
 /// depend on which frequencies are asked for. At 0 it is 0, or pi for a negative static gain (-pi where an unstable

@@ -1,4 +1,5 @@
-//! Initial-condition responses: what a filter says of samples before the first, and the combination of them that fits best.
+//! Initial-condition responses: what a filter says of samples before the first, and the combination of them that fits
+//! best.
 
 use thetahat_numerics::regression::{Lagged, Presample, Taps, Unsolved, divide, sum};
 
@@ -6,7 +7,8 @@ use crate::Error;
 
 /// A response has died away when it is below this fraction of its largest value.
 const NEGLIGIBLE: f64 = 1e-20;
-/// An initial condition of which less than this fraction shows in the errors is not seen: what is left of it is rounding.
+/// An initial condition of which less than this fraction shows in the errors is not seen: what is left of it is
+/// rounding.
 pub(super) const UNSEEN: f64 = 1e-11;
 
 /// A response until it has died away, or is not finite any more, or has `length` samples. `compute` gives its

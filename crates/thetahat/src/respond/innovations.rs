@@ -6,11 +6,11 @@
 //! e(t) = (D(q)/C(q)) w(t)
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a segment of which
-//! the past is unknown, v = D w is set to zero, and with it e = v/C; r = max(na, nb + nk - 1) + nd, over the inputs
-//! without F. F begins from rest, or with impulses: nf initial-condition responses of 1/F, the combination of which makes up for any x
-//! before, inputs before being zero; or max(nf, nb + nk - 1) of them, which makes up for any such inputs too. This is what estimates
-//! make of their first samples.
+//! (Ljung, System Identification, 2nd ed. 1999, sections 3.2 and 4.2). In the first r samples of a segment of which the
+//! past is unknown, v = D w is set to zero, and with it e = v/C; r = max(na, nb + nk - 1) + nd, over the inputs without
+//! F. F begins from rest, or with impulses: nf initial-condition responses of 1/F, the combination of which makes up
+//! for any x before, inputs before being zero; or max(nf, nb + nk - 1) of them, which makes up for any such inputs too.
+//! This is what estimates make of their first samples.
 
 use std::ops::Range;
 
@@ -97,13 +97,15 @@ pub(super) struct Basis {
     gaps: Vec<Range<usize>>,
 }
 
-/// The innovations of each segment that has samples with a prediction `horizon` steps ahead. Only these count: those with
-/// a measured output to look from, for a start from anything but zero.
+/// The innovations of each segment that has samples with a prediction `horizon` steps ahead. Only these count: those
+/// with a measured output to look from, for a start from anything but zero.
 ///
-/// Where the inputs before the record are unknown and matter, their effect is estimated with the initial conditions if that is
-/// worth its parameters, for all segments or none, by the rule of [`Initial::Auto`](crate::estimate::Initial::Auto).
+/// Where the inputs before the record are unknown and matter, their effect is estimated with the initial conditions if
+/// that is worth its parameters, for all segments or none, by the rule of
+/// [`Initial::Auto`](crate::estimate::Initial::Auto).
 ///
-/// O(N (na + nb + nc + nd + nf)), and O(N n^2) more for n initial conditions, as far as their responses do not die away.
+/// O(N (na + nb + nc + nd + nf)), and O(N n^2) more for n initial conditions, as far as their responses do not die
+/// away.
 ///
 /// # Errors
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
@@ -156,8 +158,8 @@ pub(super) fn of_segments(
     Ok(if worth { more } else { found })
 }
 
-/// For a start from estimated initial conditions: how many samples of a segment have no e, and where impulses begin. The segment
-/// begins with the past that the errors of its segment reach back to.
+/// For a start from estimated initial conditions: how many samples of a segment have no e, and where impulses begin.
+/// The segment begins with the past that the errors of its segment reach back to.
 fn estimated(model: &PolynomialModel, past: usize, with_inputs: bool) -> (usize, usize) {
     let presample = past.min(model.orders.history()).max(model.orders.conditioned());
     (presample, if past > 0 || with_inputs { presample - model.orders.nd } else { 0 })
@@ -296,7 +298,8 @@ fn whitened(model: &PolynomialModel, disturbance: &[f64], presample: usize) -> V
     errors
 }
 
-/// How many impulses an input has: nf, or as many more as there are unknown inputs that x depends on from sample `first` on.
+/// How many impulses an input has: nf, or as many more as there are unknown inputs that x depends on from sample
+/// `first` on.
 fn count(model: &PolynomialModel, input: usize, first: usize, with_inputs: bool) -> usize {
     let orders = &model.orders;
     if with_inputs { orders.free_responses_and_inputs(input, first) } else { orders.free_responses(input) }

@@ -13,9 +13,9 @@ use crate::data::{Log, Rows};
 use crate::model::Model;
 
 impl Model {
-    /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said otherwise. A model in
-    /// continuous time is sampled as the log is.
-    /// `fitted` are the rows of this log that it was fitted to.
+    /// The model beside some rows of a log of which its offsets were taken; responses start naturally unless it is said
+    /// otherwise. A model in continuous time is sampled as the log is. `fitted` are the rows of this log that it was
+    /// fitted to.
     ///
     /// # Errors
     /// [`Error::Data`] for channels or rows that are not there, and a clock or numbers that the model cannot follow.
@@ -66,9 +66,10 @@ impl Model {
         }
     }
 
-    /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations know what their text says of
-    /// their states in the first row of a log; free runs start from the state that explains the outputs best, as state-space models do. Nonlinear ARX models start
-    /// from measured samples, processes at rest, as they were fitted.
+    /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations
+    /// know what their text says of their states in the first row of a log; free runs start from the state that
+    /// explains the outputs best, as state-space models do. Nonlinear ARX models start from measured samples, processes
+    /// at rest, as they were fitted.
     pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
             Self::Polynomial(model) => InitialCondition::natural(model, horizon),

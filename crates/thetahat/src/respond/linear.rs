@@ -22,7 +22,8 @@ impl LinearModel<'_> {
         Ok(found)
     }
 
-    /// The response to a unit step of an input, counted from 0. See [`step_response`]. In continuous time it is exact at the samples.
+    /// The response to a unit step of an input, counted from 0. See [`step_response`]. In continuous time it is exact
+    /// at the samples.
     ///
     /// # Errors
     /// As for [`step_response`].
@@ -37,11 +38,12 @@ impl LinearModel<'_> {
         }
     }
 
-    /// The response to an impulse of an input, counted from 0. See [`impulse_response`]. In continuous time the impulse has area 1 and no
-    /// duration.
+    /// The response to an impulse of an input, counted from 0. See [`impulse_response`]. In continuous time the impulse
+    /// has area 1 and no duration.
     ///
     /// # Errors
-    /// As for [`impulse_response`]; [`Error::Argument`] in continuous time where the input acts at once, as the response is then infinite.
+    /// As for [`impulse_response`]; [`Error::Argument`] in continuous time where the input acts at once, as the
+    /// response is then infinite.
     pub fn impulse_response(&self, input: usize, samples: Option<usize>) -> Result<TransientResponse, Error> {
         match self {
             Self::Polynomial(model) => impulse_response(model, input, samples),

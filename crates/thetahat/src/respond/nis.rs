@@ -3,9 +3,9 @@ use serde::{Deserialize, Serialize};
 
 /// How the normalised innovations squared of a filter lay, counted by row.
 ///
-/// That of a row is e' S^-1 e over the outputs that were measured in it: chi-square with as many degrees of freedom as there
-/// are of these, if the model and its noises are right (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to
-/// Tracking and Navigation, 2001, section 5.4).
+/// That of a row is e' S^-1 e over the outputs that were measured in it: chi-square with as many degrees of freedom as
+/// there are of these, if the model and its noises are right (Bar-Shalom, Li and Kirubarajan, Estimation with
+/// Applications to Tracking and Navigation, 2001, section 5.4).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NisSummary {
     /// How many rows have one.

@@ -1,15 +1,16 @@
 //! A nonlinear ARX model beside a log.
 //!
-//! Predictions k steps ahead run the model k steps from what was measured, with e = 0. To first order in e and in the parameters, with
-//! A_i = dg/dy(t-i) along the run, a matrix where there are several outputs,
+//! Predictions k steps ahead run the model k steps from what was measured, with e = 0. To first order in e and in the
+//! parameters, with A_i = dg/dy(t-i) along the run, a matrix where there are several outputs,
 //!
 //! ```text
 //! e(t|t-k) = e(t) + sum_i A_i e(t-i|t-k),   dy(t|t-k)/dtheta = f(z) + sum_i A_i dy(t-i|t-k)/dtheta
 //! ```
 //!
-//! and the covariance of the errors is that of the first, by its covariance over the last lags, plus g' P g with the second (Ljung,
-//! System Identification, 2nd ed. 1999, section 9.4, for a predictor that is not linear). That takes e for noise that drives the plant. Where
-//! rows were held out, runs over them say how far those of two samples and more are off, whatever e is: by the length of the run alone.
+//! and the covariance of the errors is that of the first, by its covariance over the last lags, plus g' P g with the
+//! second (Ljung, System Identification, 2nd ed. 1999, section 9.4, for a predictor that is not linear). That takes e
+//! for noise that drives the plant. Where rows were held out, runs over them say how far those of two samples and more
+//! are off, whatever e is: by the length of the run alone.
 
 mod errors;
 mod runner;
@@ -41,8 +42,8 @@ const FEWEST: usize = 20;
 /// Samples that are predicted on one thread.
 const PART: usize = 1024;
 
-/// The next output, less its offset, where one regressor moves through its range and the others stay in the middle of theirs; with where
-/// it is in its range, from 0 to 1.
+/// The next output, less its offset, where one regressor moves through its range and the others stay in the middle of
+/// theirs; with where it is in its range, from 0 to 1.
 #[cfg(feature = "html")]
 pub(crate) fn slice(
     model: &NonlinearArxModel,
@@ -85,7 +86,8 @@ pub(crate) struct NonlinearArxOnLog<'l> {
     ahead: Record<'l>,
     free_run: Record<'l>,
     one_step: OnceLock<Vec<Response>>,
-    /// Whether outputs that are fed back are kept within the range of the estimation rows, and in how many samples they were.
+    /// Whether outputs that are fed back are kept within the range of the estimation rows, and in how many samples they
+    /// were.
     clamp: bool,
     clamped: AtomicUsize,
 }
@@ -201,7 +203,8 @@ impl<'l> NonlinearArxOnLog<'l> {
         errors
     }
 
-    /// What runs over held-out rows say of the deviations of each output so many samples ahead. One sample ahead e says it.
+    /// What runs over held-out rows say of the deviations of each output so many samples ahead. One sample ahead e says
+    /// it.
     fn measured_deviations(&self, steps: usize) -> Option<Vec<f64>> {
         let maps = (steps > 1).then_some(&self.runner.model.maps)?;
         maps.iter().map(|map| map.run_error(steps)).collect()
@@ -242,8 +245,8 @@ impl<'l> NonlinearArxOnLog<'l> {
     }
 }
 
-/// Calls `take` with what is said of the outputs at each of some rows from what is known `steps` before, and with the variances of the
-/// errors if those are wanted.
+/// Calls `take` with what is said of the outputs at each of some rows from what is known `steps` before, and with the
+/// variances of the errors if those are wanted.
 fn ahead(
     runner: &Runner<'_>,
     signals: &Signals<'_>,

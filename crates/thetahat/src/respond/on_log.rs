@@ -31,7 +31,8 @@ pub(crate) trait OnLog: Sync {
     /// The responses, as such deviations.
     fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error>;
 
-    /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is none.
+    /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is
+    /// none.
     fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error>;
 
     /// The same of a free run from that start; none where nothing tells them.
@@ -39,18 +40,19 @@ pub(crate) trait OnLog: Sync {
         None
     }
 
-    /// How many of these deviations from a prediction the end of an interval lies that holds the output with probability `level`.
+    /// How many of these deviations from a prediction the end of an interval lies that holds the output with
+    /// probability `level`.
     fn quantile(&self, level: f64) -> f64;
 
-    /// The variance that the model expects of an error one step ahead, in the mean, and how many times larger the squared errors are of
-    /// which `mse` is the mean.
+    /// The variance that the model expects of an error one step ahead, in the mean, and how many times larger the
+    /// squared errors are of which `mse` is the mean.
     fn noise(&self, output: usize, mse: Option<f64>) -> (f64, Option<f64>);
 
     /// What is left of each output one step ahead.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error>;
 
-    /// What is expected after the last usable row of `rows`, at most this many steps ahead, and the row (0-based) that it begins with;
-    /// none where there is nothing to start from, or predictions reach there by themselves.
+    /// What is expected after the last usable row of `rows`, at most this many steps ahead, and the row (0-based) that
+    /// it begins with; none where there is nothing to start from, or predictions reach there by themselves.
     fn forecast(
         &self,
         log: &Log,
@@ -59,13 +61,14 @@ pub(crate) trait OnLog: Sync {
         start: InitialCondition,
     ) -> Result<Option<(usize, Vec<Forecast>)>, Error>;
 
-    /// The share of the samples of an output's response for which the model read what lies outside of what it was fitted to; none where
-    /// that does not matter.
+    /// The share of the samples of an output's response for which the model read what lies outside of what it was
+    /// fitted to; none where that does not matter.
     fn outside(&self, _output: usize, _responses: &[Response], _horizon: Horizon) -> Option<f64> {
         None
     }
 
-    /// In how many samples the last free run was kept within the range of what the model was fitted to; none where it is not.
+    /// In how many samples the last free run was kept within the range of what the model was fitted to; none where it
+    /// is not.
     fn clamped(&self) -> Option<usize> {
         None
     }

@@ -20,26 +20,27 @@ pub(super) const MOST_STEPS: usize = 1_000_000;
 /// y^(t | t-k) = y(t) - sum_{i<k} h_i e(t-i)
 /// ```
 ///
-/// which is what the equation gives that runs k steps from what was known, with e = 0 (Ljung, System Identification, 2nd
-/// ed. 1999, section 3.2; Åström, Introduction to Stochastic Control Theory, 1970, chapter 6).
+/// which is what the equation gives that runs k steps from what was known, with e = 0 (Ljung, System Identification,
+/// 2nd ed. 1999, section 3.2; Åström, Introduction to Stochastic Control Theory, 1970, chapter 6).
 ///
-/// [`InitialCondition::Zero`] takes zeros before each segment, and every sample has a prediction. [`InitialCondition::Drop`] and
-/// [`InitialCondition::Estimate`] leave out the samples without an output k steps before them to look from: the first r + k - 1
-/// of those they use (for r see [`InitialCondition`]). What unknown samples have done to B/F u is nothing to the first two; the
-/// last estimates it from the one-step errors, whatever k is, as estimates with
-/// [`Initial::Estimate`](crate::estimate::Initial::Estimate) do. It leaves out segments with no more samples than there are numbers
-/// to estimate.
+/// [`InitialCondition::Zero`] takes zeros before each segment, and every sample has a prediction.
+/// [`InitialCondition::Drop`] and [`InitialCondition::Estimate`] leave out the samples without an output k steps before
+/// them to look from: the first r + k - 1 of those they use (for r see [`InitialCondition`]). What unknown samples have
+/// done to B/F u is nothing to the first two; the last estimates it from the one-step errors, whatever k is, as
+/// estimates with [`Initial::Estimate`](crate::estimate::Initial::Estimate) do. It leaves out segments with no more
+/// samples than there are numbers to estimate.
 ///
-/// Signals are deviations from the model's offsets. Cost: O(N (na + nb + nc + nd + nf + k)), the k up to where h has died
-/// away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
+/// Signals are deviations from the model's offsets. Cost: O(N (na + nb + nc + nd + nf + k)), the k up to where h has
+/// died away; for n initial conditions to be estimated O(N n^2) more, up to where their responses have.
 ///
 /// Models without A, C and D have predictions where an output is missing too, as they need no past one (see
 /// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
 /// # Errors
-/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or [`InitialCondition::Estimate`] is
-/// asked of a model without C, D and F, which has nothing to estimate; [`Error::Undetermined`] if an initial
-/// condition cannot be told from the data, as for a model so unstable that its responses overflow.
+/// [`Error::Argument`] if `horizon` is 0, the record does not have the model's inputs, or
+/// [`InitialCondition::Estimate`] is asked of a model without C, D and F, which has nothing to estimate;
+/// [`Error::Undetermined`] if an initial condition cannot be told from the data, as for a model so unstable that its
+/// responses overflow.
 ///
 /// ```
 /// use thetahat::data::Record;
@@ -109,8 +110,9 @@ pub(super) fn predicted(
 /// The standard deviation of the error of a k-step prediction, in units of y: sigma sqrt(sum_{i<k} h_i^2), with h the
 /// impulse response of C/(A D) and sigma^2 the variance of e.
 ///
-/// It is that of a true model that started long ago: the uncertainty of the parameters and of the initial condition comes
-/// on top, as [`prediction_deviations`](crate::respond::prediction_deviations) have it. Infinite where h overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
+/// It is that of a true model that started long ago: the uncertainty of the parameters and of the initial condition
+/// comes on top, as [`prediction_deviations`](crate::respond::prediction_deviations) have it. Infinite where h
+/// overflows. Cost: O(k (na + nc + nd)), up to where h has died away.
 ///
 /// # Errors
 /// [`Error::Argument`] if `horizon` is 0 or above 10^6.

@@ -5,9 +5,9 @@
 //!           c_i:  (1/C) q^-i e         d_i: -(1/C) q^-i w
 //! ```
 //!
-//! with x_j = (B_j/F_j) u_j and w = A y - sum_j x_j (Ljung, System Identification, 2nd ed. 1999, section 10.3). All filters
-//! begin from rest at the first sample of a segment: what that leaves out dies away, and tests need psi to first order
-//! only.
+//! with x_j = (B_j/F_j) u_j and w = A y - sum_j x_j (Ljung, System Identification, 2nd ed. 1999, section 10.3). All
+//! filters begin from rest at the first sample of a segment: what that leaves out dies away, and tests need psi to
+//! first order only.
 
 use std::borrow::Cow;
 use std::fmt::Debug;
@@ -45,8 +45,8 @@ pub(crate) trait Regressors: Debug + Sync {
     /// Their covariance; none where it is not known.
     fn covariance(&self) -> Option<&[Vec<f64>]>;
 
-    /// psi over a record, in the order of the parameters. `noise_free`: with (B/A) u in the place of y, as instruments have it; for models
-    /// without C, D and F.
+    /// psi over a record, in the order of the parameters. `noise_free`: with (B/A) u in the place of y, as instruments
+    /// have it; for models without C, D and F.
     fn regressors<'a>(
         &self,
         record: &Record<'a>,
@@ -54,9 +54,9 @@ pub(crate) trait Regressors: Debug + Sync {
         noise_free: bool,
     ) -> Vec<Regressor<'a>>;
 
-    /// X_k = E psi(t) e(t - k)/var e, a row for each lag 1 … L and a column for each parameter: past e is in psi by -1/A for a, 1/C for c and
-    /// -1/D for d, each delayed by the coefficient's number, and not at all for B and F. Zero for an unstable A or D, which has no such
-    /// response.
+    /// X_k = E psi(t) e(t - k)/var e, a row for each lag 1 … L and a column for each parameter: past e is in psi by
+    /// -1/A for a, 1/C for c and -1/D for d, each delayed by the coefficient's number, and not at all for B and F. Zero
+    /// for an unstable A or D, which has no such response.
     fn past_errors(&self, lags: usize) -> DMatrix<f64>;
 }
 

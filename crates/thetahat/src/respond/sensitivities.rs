@@ -1,36 +1,38 @@
 //! What the uncertainty of the parameters and of the initial states does to predictions.
 //!
-//! A prediction y^(theta) from estimated parameters misses by what the noise does after the samples that it looks from, and by
-//! what the parameters are off; to first order, the two being independent on samples that are not those of the fit,
+//! A prediction y^(theta) from estimated parameters misses by what the noise does after the samples that it looks from,
+//! and by what the parameters are off; to first order, the two being independent on samples that are not those of the
+//! fit,
 //!
 //! ```text
 //! var(y - y^) = sigma^2 sum_{i<k} h_i^2 + g' P g,   g = dy^/dtheta
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, section 9.4; Box and Jenkins, Time Series Analysis, 1976, appendix A7.3). With
-//! P = sum_i l_i l_i', g'P g is the sum of (g'l_i)^2: one derivative along each l_i, exact, by the equations of the model
-//! differentiated. Along a change (dA, dB, dC, dD, dF)
+//! (Ljung, System Identification, 2nd ed. 1999, section 9.4; Box and Jenkins, Time Series Analysis, 1976, appendix
+//! A7.3). With P = sum_i l_i l_i', g'P g is the sum of (g'l_i)^2: one derivative along each l_i, exact, by the
+//! equations of the model differentiated. Along a change (dA, dB, dC, dD, dF)
 //!
 //! ```text
 //! F dx = dB u - dF x + ddelta,   dw = dA y - dx,   C de = D dw + dD w - dC e
 //! ```
 //!
-//! where ddelta are the initial conditions that fit best at the changed parameters, if they are estimated, and k steps ahead
+//! where ddelta are the initial conditions that fit best at the changed parameters, if they are estimated, and k steps
+//! ahead
 //!
 //! ```text
 //! dy^(t | t-k) = - sum_{i<k} (h_i de(t-i) + dh_i e(t-i)),   A D dh = dC - (dA D + A dD) h
 //! ```
 //!
-//! Initial states add directions of their own. Before the first e that is known, C has others of variance sigma^2. Estimated
-//! impulses into 1/F have the covariance sigma^2 (Phi'Phi)^-1 of a regression; that counts in forecasts. On the samples they
-//! were estimated from errors are smaller for it, not larger, and nothing is added.
+//! Initial states add directions of their own. Before the first e that is known, C has others of variance sigma^2.
+//! Estimated impulses into 1/F have the covariance sigma^2 (Phi'Phi)^-1 of a regression; that counts in forecasts. On
+//! the samples they were estimated from errors are smaller for it, not larger, and nothing is added.
 //!
-//! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of the equation,
-//! two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
+//! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of
+//! the equation, two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
 //! [`OffsetCovariance`](crate::model::OffsetCovariance)).
 //!
-//! With sigma^2 estimated with nu degrees of freedom, the error over its scale is Student's t, whose standard deviation is
-//! sqrt(nu/(nu - 2)) of the scale.
+//! With sigma^2 estimated with nu degrees of freedom, the error over its scale is Student's t, whose standard deviation
+//! is sqrt(nu/(nu - 2)) of the scale.
 
 use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 use thetahat_numerics::regression::{add_filtered, divide, divide_from, product};
@@ -42,7 +44,8 @@ use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
 
-/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be told.
+/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be
+/// told.
 const UNSEEN: f64 = 1e-20;
 
 /// A change of the polynomials, in powers of q^-1 as these are; what is fixed in them does not change.
@@ -165,8 +168,8 @@ impl Paths {
         Self { known, presample, basis, inputs, output, disturbance, errors, responses }
     }
 
-    /// The derivative along a change, of impulses into 1/F, and of the errors before the first that is known: of the one
-    /// `earlier` samples before it.
+    /// The derivative along a change, of impulses into 1/F, and of the errors before the first that is known: of the
+    /// one `earlier` samples before it.
     fn moved(&self, model: &PolynomialModel, change: &Change, impulses: &Impulses, earlier: usize) -> Moved {
         let mut x = vec![0.0; self.output.len()];
         let all = 0..x.len();
@@ -299,24 +302,25 @@ impl Paths {
     }
 }
 
-/// The standard deviation of an error whose variance is a sum of squares, as many degrees of freedom being behind the noise
-/// variance.
+/// The standard deviation of an error whose variance is a sum of squares, as many degrees of freedom being behind the
+/// noise variance.
 pub(super) fn student(model: &PolynomialModel, noise: f64, other: f64) -> f64 {
     let deviation = noise.hypot(other.sqrt()) * model.student_factor();
     if deviation.is_nan() { f64::INFINITY } else { deviation }
 }
 
-/// The standard deviations of the errors of k-step predictions of a record, one for each sample, in units of y: what the noise
-/// does, and what the uncertainty of the parameters, of the output's offset and of the first errors adds.
+/// The standard deviations of the errors of k-step predictions of a record, one for each sample, in units of y: what
+/// the noise does, and what the uncertainty of the parameters, of the output's offset and of the first errors adds.
 ///
 /// ```text
 /// sigma^2 sum_{i<k} h_i^2 + g' P g,   g = dy^(t | t-k)/dtheta
 /// ```
 ///
-/// The first part is [`prediction_deviation`](crate::respond::prediction_deviation) squared; the second depends on the signals. Where the
-/// noise variance was estimated with nu degrees of freedom, they are those of Student's distribution, a factor
-/// sqrt(nu/(nu - 2)). They are right for samples that the model was not fitted to; on those of the fit they are a little too
-/// large. NaN where [`predict`](crate::respond::predict) has no prediction. `horizon` and `start` are as there.
+/// The first part is [`prediction_deviation`](crate::respond::prediction_deviation) squared; the second depends on the
+/// signals. Where the noise variance was estimated with nu degrees of freedom, they are those of Student's
+/// distribution, a factor sqrt(nu/(nu - 2)). They are right for samples that the model was not fitted to; on those of
+/// the fit they are a little too large. NaN where [`predict`](crate::respond::predict) has no prediction. `horizon` and
+/// `start` are as there.
 ///
 /// Cost: p + 1 times that of the prediction for p parameters.
 ///

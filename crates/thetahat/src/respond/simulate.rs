@@ -14,10 +14,11 @@ use crate::model::PolynomialModel;
 
 /// The free run of a model: A(q) y^(t) = sum_j (B_j(q)/F_j(q)) u_j(t), driven by the inputs alone.
 ///
-/// [`InitialCondition::Zero`] takes zeros before each segment. [`InitialCondition::Drop`] goes on from measured samples, with e = 0
-/// from the first sample that counts: what they say of the disturbance, which C and D give a memory, dies away from
-/// there. For ARX it is the difference equation run from measured outputs and inputs. [`InitialCondition::Estimate`] takes the inputs
-/// that were measured directly before the segment, and adds the combination of initial-condition responses
+/// [`InitialCondition::Zero`] takes zeros before each segment. [`InitialCondition::Drop`] goes on from measured
+/// samples, with e = 0 from the first sample that counts: what they say of the disturbance, which C and D give a
+/// memory, dies away from there. For ARX it is the difference equation run from measured outputs and inputs.
+/// [`InitialCondition::Estimate`] takes the inputs that were measured directly before the segment, and adds the
+/// combination of initial-condition responses
 ///
 /// ```text
 /// q^-i (1/A) delta,   i < max(na, nb + nk - 1 of the inputs without F)
@@ -25,15 +26,17 @@ use crate::model::PolynomialModel;
 /// ```
 ///
 /// that brings y^ closest to the output in the least-squares sense: everything that unknown samples before the segment
-/// can do. Where the noise integrates, D(1) = 0, a constant is among them: its level before the segment is not known.
-/// n is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are taken to be zero, unless estimating them is worth its parameters by the rule of
-/// [`Initial::Auto`](crate::estimate::Initial::Auto). Segments too short for a start are left out.
+/// can do. Where the noise integrates, D(1) = 0, a constant is among them: its level before the segment is not known. n
+/// is how many earlier inputs B reaches back to that are not known, nb + nk - 1 at most. They are taken to be zero,
+/// unless estimating them is worth its parameters by the rule of [`Initial::Auto`](crate::estimate::Initial::Auto).
+/// Segments too short for a start are left out.
 ///
 /// But for [`InitialCondition::Drop`], the run goes on where an output is missing (see
 /// [`Log::driven_record`](crate::data::Log::driven_record)); these samples do not count.
 ///
-/// Signals are deviations from the model's offsets. The output of the record is not read for [`InitialCondition::Zero`].
-/// Cost: O(N (na + nb + nf)), and O(N n) more for n initial-condition responses that do not die away, O(N n^2) where outputs are missing.
+/// Signals are deviations from the model's offsets. The output of the record is not read for
+/// [`InitialCondition::Zero`]. Cost: O(N (na + nb + nf)), and O(N n) more for n initial-condition responses that do not
+/// die away, O(N n^2) where outputs are missing.
 ///
 /// # Errors
 /// [`Error::Argument`] if the record does not have the model's inputs; [`Error::Undetermined`] if an initial condition
@@ -131,7 +134,8 @@ impl<'a> Free<'a> {
         Self { model, output: record.output, runs: Vec::new(), responses: Vec::new() }
     }
 
-    /// How many initial-condition responses of 1/A, of each 1/(A F_j), and of 1/(1 - q^-1) make up for what is unknown before a segment.
+    /// How many initial-condition responses of 1/A, of each 1/(A F_j), and of 1/(1 - q^-1) make up for what is unknown
+    /// before a segment.
     fn counts(&self, past: usize, with_inputs: bool) -> Vec<usize> {
         let orders = &self.model.orders;
         let inputs = 0..orders.inputs();
@@ -211,8 +215,8 @@ impl<'a> Free<'a> {
         Ok(Some(Completed { run: index, head, measured, samples, unknown }))
     }
 
-    /// The first of `values`, with the combination of initial-condition responses that brings them closest to `output`, which may
-    /// have gaps. It does nothing to those after them.
+    /// The first of `values`, with the combination of initial-condition responses that brings them closest to `output`,
+    /// which may have gaps. It does nothing to those after them.
     fn closest(
         &self,
         output: &[f64],

@@ -37,15 +37,15 @@ pub struct TransientResponse {
 /// and J P J' is the variance, P being the covariance matrix of the parameters (Ljung, System Identification, 2nd ed.
 /// 1999, section 9.4). There is no standard error where P is unknown.
 ///
-/// Without `samples` the response lasts until 0.5 % of its slowest mode are left, an unstable mode has grown
-/// a hundredfold, or, where a mode lasts (an integrator), three times as long as all others need; at least 20 samples and
+/// Without `samples` the response lasts until 0.5 % of its slowest mode are left, an unstable mode has grown a
+/// hundredfold, or, where a mode lasts (an integrator), three times as long as all others need; at least 20 samples and
 /// at most 20000. It ends before a value that is not finite.
 ///
 /// Cost: O(p^2) for each sample.
 ///
 /// # Errors
-/// [`Error::Argument`] if the model has no such input, or no sample is asked for; [`Error::Data`] if the roots of a polynomial do
-/// not converge.
+/// [`Error::Argument`] if the model has no such input, or no sample is asked for; [`Error::Data`] if the roots of a
+/// polynomial do not converge.
 ///
 /// ```
 /// use thetahat::data::Record;

@@ -182,8 +182,8 @@ fn without(orders: &Orders, idle: &[usize]) -> Orders {
     orders
 }
 
-/// Whether there are enough samples for denominators of several inputs: a pole of an input that hardly acts is found near the unit
-/// circle by chance, and free runs go away with it.
+/// Whether there are enough samples for denominators of several inputs: a pole of an input that hardly acts is found
+/// near the unit circle by chance, and free runs go away with it.
 fn has_enough_for_denominators(record: &Record<'_>, orders: &Orders) -> bool {
     let denominators = orders.nf.iter().filter(|&&nf| nf > 0).count();
     denominators < 2 || total(record) >= SAMPLES_OF_DENOMINATORS * orders.parameters()
@@ -215,8 +215,8 @@ fn at_the_edge(chosen: &Orders, tried: &[Orders]) -> Option<String> {
     })
 }
 
-/// Whether a constant lowers the MDL of ARX models of few or of many coefficients: then it is part of every model that is
-/// compared, and the chosen one says whether it keeps it.
+/// Whether a constant lowers the MDL of ARX models of few or of many coefficients: then it is part of every model that
+/// is compared, and the chosen one says whether it keeps it.
 pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
     let inputs = record.inputs.len();
     if inputs <= MOST_INPUTS
@@ -232,14 +232,16 @@ pub(crate) fn constant_pays(record: &Record<'_>) -> bool {
         })
 }
 
-/// Whether the least order of an ARX model that leaves nothing is less with a constant, where there is such an order. None of data with noise.
+/// Whether the least order of an ARX model that leaves nothing is less with a constant, where there is such an order.
+/// None of data with noise.
 fn exactly(record: &Record<'_>) -> Option<bool> {
     let ones = vec![1.0; record.output.len()];
     let with = least_exact(&record.with_inputs(std::slice::from_ref(&ones)), 1)?;
     Some(least_exact(record, 0).is_none_or(|without| with < without))
 }
 
-/// The least order of an ARX model that leaves nothing, the last inputs being constants; none where there is no such order.
+/// The least order of an ARX model that leaves nothing, the last inputs being constants; none where there is no such
+/// order.
 fn least_exact(record: &Record<'_>, constants: usize) -> Option<usize> {
     let named = record.inputs.len() - constants;
     let enough = |order: &usize| are_enough(record, (order + 1) * (named + 1) + order, *order);
@@ -281,8 +283,8 @@ fn structures(task: &Task<'_>, automatic: &Automatic, closed: bool) -> Result<Ve
     }
 }
 
-/// Models of some structures in which all polynomials of the plant have one order: those that may simulate well although their
-/// delays or their noise are wrong.
+/// Models of some structures in which all polynomials of the plant have one order: those that may simulate well
+/// although their delays or their noise are wrong.
 fn diagonal(record: &Record<'_>, structures: &[Structure], nk: &[usize]) -> Result<Vec<Orders>, Error> {
     let mut models = Vec::new();
     for structure in structures {

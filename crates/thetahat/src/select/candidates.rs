@@ -13,8 +13,8 @@ use crate::model::Orders;
 pub(super) const MOST_INPUTS: usize = 100;
 /// At least this many samples for each parameter.
 pub(super) const SAMPLES: usize = 4;
-/// Samples skipped after the maximum lag, so that transients of 1/C die away: they would be tens of times the price of a
-/// parameter.
+/// Samples skipped after the maximum lag, so that transients of 1/C die away: they would be tens of times the price of
+/// a parameter.
 const FADING: usize = 50;
 /// Of a segment of mean length not more than this part is given to that.
 const LEAST_OF_PIECE: usize = 20;
@@ -109,8 +109,8 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
     record.segments.iter().map(|segment| sum_of_squares(&record.output[segment.clone()])).sum()
 }
 
-/// Whether a record has enough samples for this many parameters, and does not lose more than half of them to the start of its
-/// segments.
+/// Whether a record has enough samples for this many parameters, and does not lose more than half of them to the start
+/// of its segments.
 pub(super) fn are_enough(record: &Record<'_>, parameters: usize, left_out: usize) -> bool {
     let left = |segment: &std::ops::Range<usize>| segment.len().saturating_sub(left_out);
     let count: usize = record.segments.iter().map(left).sum();

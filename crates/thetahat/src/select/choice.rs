@@ -47,8 +47,8 @@ pub struct Grid {
     pub path: Path,
 }
 
-/// Delay, structure and orders from the data: delays first, then the least MDL among ARX up to order 10, and ARMAX, output
-/// error and Box-Jenkins up to order 3, on common samples.
+/// Delay, structure and orders from the data: delays first, then the least MDL among ARX up to order 10, and ARMAX,
+/// output error and Box-Jenkins up to order 3, on common samples.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Automatic {
     /// The structure, if it is known.
@@ -92,8 +92,8 @@ pub enum Select {
     Criterion(InformationCriterion),
     /// The mean of e^2 on the validation rows: the smallest model within 1 % of the least.
     Validation,
-    /// Cross-validation: the mean of e^2 over five blocks in time, each predicted by a model of the others; the smallest
-    /// model within 1 % of the least.
+    /// Cross-validation: the mean of e^2 over five blocks in time, each predicted by a model of the others; the
+    /// smallest model within 1 % of the least.
     Cv,
 }
 

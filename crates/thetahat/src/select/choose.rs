@@ -11,17 +11,18 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::Initial;
 
-/// Chooses the orders of a model. All models are compared on the same samples of the record; those of `validation` are for
-/// [`Select::Validation`]. Inputs are called `u1`, `u2`, ….
+/// Chooses the orders of a model. All models are compared on the same samples of the record; those of `validation` are
+/// for [`Select::Validation`]. Inputs are called `u1`, `u2`, ….
 ///
-/// A model is then fitted with [`estimate`](crate::estimate::estimate()), which may use samples that were left out here.
+/// A model is then fitted with [`estimate`](crate::estimate::estimate()), which may use samples that were left out
+/// here.
 ///
-/// Cost: for models without C, D and F, O(N p) for the p columns of all of them together, and no pass over the data for each;
-/// of each other model a search, from what its neighbours have found.
+/// Cost: for models without C, D and F, O(N p) for the p columns of all of them together, and no pass over the data for
+/// each; of each other model a search, from what its neighbours have found.
 ///
 /// # Errors
-/// [`Error::Argument`] for ranges that make no model, a structure that does not fit the inputs, an initial condition that does
-/// not fit the models, or if there is no validation record where one is needed; [`Error::Undetermined`] and
+/// [`Error::Argument`] for ranges that make no model, a structure that does not fit the inputs, an initial condition
+/// that does not fit the models, or if there is no validation record where one is needed; [`Error::Undetermined`] and
 /// [`Error::Data`] as for [`estimate`](crate::estimate::estimate()).
 ///
 /// ```

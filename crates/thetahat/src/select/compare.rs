@@ -16,9 +16,9 @@ use crate::model::Orders;
 pub(super) const LONG: usize = 1 << 16;
 pub(super) const SEGMENTS: usize = 16;
 pub(super) const SEGMENT: usize = 1 << 11;
-/// A step of a search takes N p^2 multiplications, and the searches of a choice many steps: models that take more are left out, and records of
-/// which models with [`USUAL`] coefficients for each input, and as many for the noise, take more are thinned, to segments of so many samples
-/// at least.
+/// A step of a search takes N p^2 multiplications, and the searches of a choice many steps: models that take more are
+/// left out, and records of which models with [`USUAL`] coefficients for each input, and as many for the noise, take
+/// more are thinned, to segments of so many samples at least.
 const MOST_OPERATIONS: f64 = 1e7;
 const USUAL: usize = 4;
 const SHORTEST: usize = 1 << 8;
@@ -42,8 +42,8 @@ pub(super) struct Outcome {
     pub(super) drift: Option<Drift>,
 }
 
-/// Fits all models to the same samples. Each model is there once. With `essential` ones, by what tells them apart (see `key`), others that
-/// cannot have the least MDL are not fitted.
+/// Fits all models to the same samples. Each model is there once. With `essential` ones, by what tells them apart (see
+/// `key`), others that cannot have the least MDL are not fitted.
 ///
 /// # Errors
 /// As for [`choose`](super::choose).
@@ -73,8 +73,8 @@ pub(super) fn compare(
     // Blocks are left where time is up: the answer so far stands.
     let with_blocks = !is_held_out && task.looks_further();
     fit_linear(record, &samples, &mut tried, searched || is_held_out || with_blocks)?;
-    // A part of a segment begins where the log knows what came before. Its initial conditions are not what the model has to
-    // tell in the whole log: they cost no more than what they take of the noise, one each.
+    // A part of a segment begins where the log knows what came before. Its initial conditions are not what the model
+    // has to tell in the whole log: they cost no more than what they take of the noise, one each.
     let own = task.estimation.segments.len() as f64 / record.segments.len().max(1) as f64;
     let price = |orders: &Orders, initial: f64| {
         let free: usize = (0..orders.inputs()).map(|input| orders.free_responses(input)).sum();
@@ -166,7 +166,8 @@ pub(super) fn compare(
     })
 }
 
-/// Segments of a long record: models of which some need a search see no more of it. With `sparing` they are shorter for many inputs.
+/// Segments of a long record: models of which some need a search see no more of it. With `sparing` they are shorter for
+/// many inputs.
 fn thinned<'a>(task: &Task<'a>, sparing: bool) -> Option<Record<'a>> {
     let usual = (USUAL * (task.inputs.len() + 1)) as f64;
     let length = if sparing { (MOST_OPERATIONS / (usual * usual)) as usize / SEGMENTS } else { usize::MAX };

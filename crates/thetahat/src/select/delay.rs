@@ -1,10 +1,10 @@
-//! The delays of inputs, from ARX models that are long enough for a disturbance of any colour: of all ranges of lags that
-//! a B may have, the one with the least MDL begins at the delay.
+//! The delays of inputs, from ARX models that are long enough for a disturbance of any colour: of all ranges of lags
+//! that a B may have, the one with the least MDL begins at the delay.
 //!
-//! A coefficient at lag 0 costs twice the price of another one: the input of a sampled plant acts one sample later, as a rule.
-//! In closed loop u(t) may follow y(t) at once, and explain it like an effect that is one; data alone do not tell the two
-//! apart, and most plants that are sampled answer later. So an input that follows the output for certain (see `validate::feedback`)
-//! has no lag 0.
+//! A coefficient at lag 0 costs twice the price of another one: the input of a sampled plant acts one sample later, as
+//! a rule. In closed loop u(t) may follow y(t) at once, and explain it like an effect that is one; data alone do not
+//! tell the two apart, and most plants that are sampled answer later. So an input that follows the output for certain
+//! (see `validate::feedback`) has no lag 0.
 //!
 //! The confidence in a delay k is its posterior probability among all windows W that were compared,
 //!
@@ -12,9 +12,10 @@
 //! P(k) = sum_{W begins at k} exp(-N MDL(W)/2) / sum_W exp(-N MDL(W)/2)
 //! ```
 //!
-//! (Schwarz, Annals of Statistics 6, 1978; Kass and Raftery, JASA 90, 1995, section 4.1), with no effect as one of the W, and
-//! those prices in their MDL. Of simulated delays 0 … 5 with a confidence of 0.9 or more, 88 % (slow inputs, N = 1000) to
-//! 99 % (white ones, N = 200) were right; of those behind dense multisines, which are known from their past, half were.
+//! (Schwarz, Annals of Statistics 6, 1978; Kass and Raftery, JASA 90, 1995, section 4.1), with no effect as one of the
+//! W, and those prices in their MDL. Of simulated delays 0 … 5 with a confidence of 0.9 or more, 88 % (slow inputs, N =
+//! 1000) to 99 % (white ones, N = 200) were right; of those behind dense multisines, which are known from their past,
+//! half were.
 
 use std::ops::Range;
 
@@ -36,7 +37,8 @@ const DELAY_ORDER: usize = 10;
 const DELAY_LAGS: usize = 14;
 /// Lags at most, where a delay seems to be longer.
 const MOST_LAGS: usize = 112;
-/// What windows with lag 0 cost on top, in prices of a parameter, and those that begin late: of so many one is good by chance.
+/// What windows with lag 0 cost on top, in prices of a parameter, and those that begin late: of so many one is good by
+/// chance.
 const AT_ONCE: f64 = 1.0;
 const LATE: f64 = 2.0;
 /// What stands for the MDL of a model that leaves nothing, which is not defined.
@@ -181,8 +183,8 @@ impl Long {
     }
 }
 
-/// The delays of the first inputs of a record, those that have a name, each with whether it follows the output; the others are a constant
-/// and a trend. None where there are too few samples, or too many inputs.
+/// The delays of the first inputs of a record, those that have a name, each with whether it follows the output; the
+/// others are a constant and a trend. None where there are too few samples, or too many inputs.
 ///
 /// # Errors
 /// [`Error::Data`] if squares leave the range of numbers.
@@ -196,8 +198,8 @@ pub(crate) fn delays(record: &Record<'_>, names: &[String], follows: &[bool]) ->
     found_in(&data, names)
 }
 
-/// The same where the moments of all signals are known, of which y is the first of `signals` and the inputs are the others; with a
-/// constant. O(p^3) for p lags of all of them.
+/// The same where the moments of all signals are known, of which y is the first of `signals` and the inputs are the
+/// others; with a constant. O(p^3) for p lags of all of them.
 ///
 /// # Errors
 /// [`Error::Data`] if squares leave the range of numbers, or have not kept the digits that the comparison needs.

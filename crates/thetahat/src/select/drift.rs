@@ -1,9 +1,10 @@
 //! Whether the noise drifts: its level wanders without end, and no input makes it.
 //!
-//! The model with the least MDL is fitted again with a noise that integrates, 1 - q^-1 in D in the place of a root that was searched for
-//! (Box, Jenkins and Reinsel, Time Series Analysis, 1994, chapter 4). That is one parameter less, so MDL is less unless the data speak against
-//! it. Free runs have no level of their own then: they are compared in windows of some settling times, each with the level that fits it
-//! best. Without that a slow pole of a plant is rewarded for following the drift.
+//! The model with the least MDL is fitted again with a noise that integrates, 1 - q^-1 in D in the place of a root that
+//! was searched for (Box, Jenkins and Reinsel, Time Series Analysis, 1994, chapter 4). That is one parameter less, so
+//! MDL is less unless the data speak against it. Free runs have no level of their own then: they are compared in
+//! windows of some settling times, each with the level that fits it best. Without that a slow pole of a plant is
+//! rewarded for following the drift.
 
 use super::Task;
 use super::candidates::Trial;
@@ -25,8 +26,8 @@ const LEAST: f64 = 20.0;
 const SETTLED: f64 = 4.0;
 const SHORTEST: usize = 64;
 
-/// The orders of a model with a noise that integrates in the place of one with a slow root: D has that root, or A, and then B one to cancel
-/// it. None where the noise has no model of its own.
+/// The orders of a model with a noise that integrates in the place of one with a slow root: D has that root, or A, and
+/// then B one to cancel it. None where the noise has no model of its own.
 fn integrating(orders: &Orders) -> Option<Orders> {
     match orders {
         Orders { nd: 1.., .. } => Some(orders.clone()),
@@ -38,7 +39,8 @@ fn integrating(orders: &Orders) -> Option<Orders> {
     }
 }
 
-/// The same for any model that was chosen where the noise drifts: one without a model of the noise gets a random walk and white noise.
+/// The same for any model that was chosen where the noise drifts: one without a model of the noise gets a random walk
+/// and white noise.
 pub(crate) fn drifting(orders: &Orders) -> Orders {
     integrating(orders).unwrap_or_else(|| Orders { nc: orders.nc.max(1), nd: 1, ..orders.clone() })
 }

@@ -13,7 +13,8 @@ use crate::respond::Horizon;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Focus {
-    /// With inputs and without orders: prediction, unless another model simulates held-out blocks clearly better. Else prediction.
+    /// With inputs and without orders: prediction, unless another model simulates held-out blocks clearly better. Else
+    /// prediction.
     #[default]
     Auto,
     /// Errors one step ahead.

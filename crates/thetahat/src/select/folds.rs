@@ -26,7 +26,8 @@ pub(super) fn columns_of(tried: &[Trial], linear: &[usize], inputs: usize) -> Co
 /// Consecutive samples, and which segment they are of.
 type Piece = (usize, Range<usize>);
 
-/// A record cut into blocks of consecutive samples, as long as one another to within one, each of which is left out once.
+/// A record cut into blocks of consecutive samples, as long as one another to within one, each of which is left out
+/// once.
 pub(super) struct Folds<'t, 'r> {
     record: &'t Record<'r>,
     blocks: Vec<Vec<Piece>>,
@@ -73,8 +74,8 @@ impl<'t, 'r> Folds<'t, 'r> {
         part(self.record, joined(others.flat_map(|(_, block)| block)))
     }
 
-    /// The parameters of models fitted without a block, for each block: from those of all blocks, and for linear ones from
-    /// sums over blocks. None where the others do not determine them.
+    /// The parameters of models fitted without a block, for each block: from those of all blocks, and for linear ones
+    /// from sums over blocks. None where the others do not determine them.
     ///
     /// # Errors
     /// [`Error::Interrupted`].

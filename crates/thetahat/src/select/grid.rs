@@ -19,8 +19,8 @@ impl Grid {
     /// first of its delays.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is not one range of nb, nf and nk for all inputs or for each of them, if there are more
-    /// than 100,000 models, or none.
+    /// [`Error::Argument`] if there is not one range of nb, nf and nk for all inputs or for each of them, if there are
+    /// more than 100,000 models, or none.
     pub fn orders(&self, inputs: usize) -> Result<Vec<Orders>, Error> {
         let nk = each("nk", &self.nk, inputs)?;
         for (name, ranges) in [("nb", &self.nb), ("nf", &self.nf)] {

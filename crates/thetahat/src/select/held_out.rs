@@ -1,8 +1,9 @@
 //! How well models simulate samples that they were not fitted to, or predict them several steps ahead.
 //!
-//! The record is cut into thirds. Each model is fitted again to two of them and evaluated on the third, with the initial state
-//! that fits best there. Errors are in standard deviations of the output and count up to five of them, so that a run that leaves the
-//! range of the data does not outweigh all others; a model that is unstable without a third counts as if it had left it.
+//! The record is cut into thirds. Each model is fitted again to two of them and evaluated on the third, with the
+//! initial state that fits best there. Errors are in standard deviations of the output and count up to five of them, so
+//! that a run that leaves the range of the data does not outweigh all others; a model that is unstable without a third
+//! counts as if it had left it.
 
 use rayon::prelude::*;
 use thetahat_numerics::regression::sum;
@@ -29,9 +30,10 @@ const UNSTABLE: f64 = 1.5;
 
 /// By how many of its standard errors the mean square of one model exceeds that of another on the same samples.
 ///
-/// Errors of neighbouring samples go together. Sums over parts hardly do, so their differences tell how certain the mean is: batch means
-/// (Schmeiser, Batch size effects in the analysis of simulation output, Operations Research 30, 1982) of the differences of two
-/// models' losses (Diebold and Mariano, Comparing predictive accuracy, J. Business and Economic Statistics 13, 1995).
+/// Errors of neighbouring samples go together. Sums over parts hardly do, so their differences tell how certain the
+/// mean is: batch means (Schmeiser, Batch size effects in the analysis of simulation output, Operations Research 30,
+/// 1982) of the differences of two models' losses (Diebold and Mariano, Comparing predictive accuracy, J. Business and
+/// Economic Statistics 13, 1995).
 pub(super) fn standard_errors(one: &[f64], other: &[f64]) -> f64 {
     let count = one.len() as f64;
     let differences = || one.iter().zip(other).map(|(one, other)| one - other);
@@ -41,7 +43,8 @@ pub(super) fn standard_errors(one: &[f64], other: &[f64]) -> f64 {
     mean / (variance / count).sqrt()
 }
 
-/// The figures of a model, and the sums of e^2 on parts of the blocks, in order and as long as one another to within one sample.
+/// The figures of a model, and the sums of e^2 on parts of the blocks, in order and as long as one another to within
+/// one sample.
 pub(super) type Seen = (HeldOut, Vec<f64>);
 
 /// The figures of some models; none of others, and where the data do not determine a model without a block.
@@ -81,8 +84,8 @@ pub(super) fn figures(
     Ok(figures)
 }
 
-/// The models that are evaluated: of each structure, delay and number of parameters the one with the least criterion, in the order
-/// of their criterion.
+/// The models that are evaluated: of each structure, delay and number of parameters the one with the least criterion,
+/// in the order of their criterion.
 pub(super) fn promising(order: &[usize], tried: &[Trial]) -> Vec<usize> {
     let mut seen: Vec<(Structure, usize, &[usize])> = Vec::new();
     let mut promising = Vec::new();
@@ -193,8 +196,8 @@ impl<'r> Blocks<'r> {
         Self { tests, onward: Onward::new(record, folds), deviation, window }
     }
 
-    /// The figures of models, each fitted without the block of its place, and whether they are stable; `respond` says what one makes of a
-    /// record. None where a block has no samples that count.
+    /// The figures of models, each fitted without the block of its place, and whether they are stable; `respond` says
+    /// what one makes of a record. None where a block has no samples that count.
     pub(super) fn figures<M>(
         &self,
         models: &[(bool, M)],

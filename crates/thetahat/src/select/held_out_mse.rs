@@ -14,8 +14,8 @@ use crate::estimate::Common;
 /// Blocks of a cross-validation.
 const BLOCKS: usize = 5;
 
-/// The mean of e^2 of each model on held-out samples, the same for all; none where the choice does not need it, or the data
-/// do not determine a model.
+/// The mean of e^2 of each model on held-out samples, the same for all; none where the choice does not need it, or the
+/// data do not determine a model.
 ///
 /// # Errors
 /// [`Error::Undetermined`] if no such sample counts; [`Error::Interrupted`].

@@ -12,9 +12,10 @@
 //! rows of its factor with the one before it: all nb from one factor, which begins with that of A. Cost: O(N p) for
 //! the Gram matrix of p columns, then k^2/2 multiply-adds for the k-th column of a model, and no pass over the data.
 //!
-//! Where y'y - z'z has lost its digits, or the columns nearly depend on one another, the columns of the triangular factor of
-//! the rows stand for those of Phi, and are made orthogonal one after the other, each twice (Giraud, Langou and Rozložník
-//! 2005, Computers and Mathematics with Applications 50): as exact as Householder QR. O(N p^2) for that factor.
+//! Where y'y - z'z has lost its digits, or the columns nearly depend on one another, the columns of the triangular
+//! factor of the rows stand for those of Phi, and are made orthogonal one after the other, each twice (Giraud, Langou
+//! and Rozložník 2005, Computers and Mathematics with Applications 50): as exact as Householder QR. O(N p^2) for that
+//! factor.
 
 use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
@@ -34,7 +35,8 @@ const DEPENDENT: f64 = 1e-13;
 /// The same for the norm, where columns are made orthogonal.
 const PARALLEL: f64 = 1e-13;
 
-/// All columns that some models have: -y(t-1) … -y(t-na), then u_j(t - l) for each input's lags from the least to the largest.
+/// All columns that some models have: -y(t-1) … -y(t-na), then u_j(t - l) for each input's lags from the least to the
+/// largest.
 #[derive(Debug)]
 pub(super) struct Columns {
     na: usize,

@@ -1,11 +1,11 @@
 //! Processes in continuous time beside the polynomial models of a step test.
 //!
-//! A log of few steps has few lags to choose orders from, and what stands between a step and its effect, a gain, time constants and a
-//! dead time, is what the test was made for. So some structures are fitted without each third of the rows, as polynomial models are
-//! (see `held_out`), and evaluated on it: by their free run from the first row on, at rest with the first inputs, as a process has no
-//! initial state of its own. Dead times are those of all rows, as the delays of polynomial models are, and time constants stay near
-//! theirs: a block may have all that there is to see of a lag. Fits see every so many rows of a long log, which costs them little: the
-//! response is exact at any time.
+//! A log of few steps has few lags to choose orders from, and what stands between a step and its effect, a gain, time
+//! constants and a dead time, is what the test was made for. So some structures are fitted without each third of the
+//! rows, as polynomial models are (see `held_out`), and evaluated on it: by their free run from the first row on, at
+//! rest with the first inputs, as a process has no initial state of its own. Dead times are those of all rows, as the
+//! delays of polynomial models are, and time constants stay near theirs: a block may have all that there is to see of a
+//! lag. Fits see every so many rows of a long log, which costs them little: the response is exact at any time.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -198,11 +198,13 @@ fn unless_undetermined<T>(found: Result<T, Error>) -> Result<Option<T>, Error> {
     }
 }
 
-/// Compares processes with the polynomial model that was chosen; also gives the structure of the one that is taken, if one is.
+/// Compares processes with the polynomial model that was chosen; also gives the structure of the one that is taken, if
+/// one is.
 ///
-/// The process has the least MDL of its free run. It is taken where no polynomial model does clearly better on the blocks, as it has the
-/// fewest parameters and they are those that a step test is made for. Where the rows without a block, that of the only step say, do not
-/// determine one of the two, it is taken if its free run over all rows is about as good.
+/// The process has the least MDL of its free run. It is taken where no polynomial model does clearly better on the
+/// blocks, as it has the fewest parameters and they are those that a step test is made for. Where the rows without a
+/// block, that of the only step say, do not determine one of the two, it is taken if its free run over all rows is
+/// about as good.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -261,7 +263,8 @@ fn said(candidate: &ProcessCandidate) -> String {
     }
 }
 
-/// The mean square of the errors of a polynomial model's free run over all rows; none where it grows out of the range of numbers.
+/// The mean square of the errors of a polynomial model's free run over all rows; none where it grows out of the range
+/// of numbers.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -277,7 +280,8 @@ fn free_run(task: &Task<'_>, orders: &Orders, guess: Option<&[f64]>) -> Result<O
     Ok(unless_undetermined(found)?.and_then(|found| square(found.parameters())))
 }
 
-/// Whether the best process is taken, and why; `free_run` is the mean square of the free run of the polynomial model that was chosen.
+/// Whether the best process is taken, and why; `free_run` is the mean square of the free run of the polynomial model
+/// that was chosen.
 fn verdict(selection: &Selection, best: &ProcessCandidate, free_run: Option<f64>) -> (bool, &'static str) {
     let Some(winners) = &selection.winners else {
         return (false, "no polynomial model is stable: the plant may be unstable");

@@ -117,7 +117,8 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     Ok(SelectedModel { selection, decisions: Vec::new(), guess })
 }
 
-/// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made first.
+/// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made
+/// first.
 fn better(a: &Candidate, b: &Candidate, by_held_out_mse: bool) -> Ordering {
     let score = |model: &Candidate| {
         if is_exact(model, by_held_out_mse) {

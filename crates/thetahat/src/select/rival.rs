@@ -11,8 +11,9 @@ use crate::Error;
 use crate::data::Record;
 use crate::respond::{Horizon, Response};
 
-/// What models do on blocks that they were not fitted to: `fit` gives one for a record without a block, and whether it is stable, `respond`
-/// the free run of a record; windows of so many samples have levels of their own. None where a record without a block does not determine one.
+/// What models do on blocks that they were not fitted to: `fit` gives one for a record without a block, and whether it
+/// is stable, `respond` the free run of a record; windows of so many samples have levels of their own. None where a
+/// record without a block does not determine one.
 pub(crate) fn on_blocks<M: Send>(
     record: &Record<'_>,
     window: Option<usize>,
@@ -31,8 +32,8 @@ pub(crate) fn on_blocks<M: Send>(
     figures.map(|(seen, _)| seen)
 }
 
-/// The mean of logarithms of the better of the polynomial model that was chosen and the one that simulates best; none where the plant is
-/// unstable, or neither was evaluated.
+/// The mean of logarithms of the better of the polynomial model that was chosen and the one that simulates best; none
+/// where the plant is unstable, or neither was evaluated.
 fn best_of_polynomials(selection: &Selection) -> Option<f64> {
     let simulation = selection.winners.as_ref()?.simulation.held_out;
     let chosen = selection.chosen.held_out;
@@ -43,7 +44,8 @@ fn best_of_polynomials(selection: &Selection) -> Option<f64> {
 }
 
 impl Selection {
-    /// Whether a model of another kind may be compared with the polynomial models that were: a stable one was evaluated on blocks.
+    /// Whether a model of another kind may be compared with the polynomial models that were: a stable one was evaluated
+    /// on blocks.
     pub(crate) fn has_rivals(&self) -> bool {
         best_of_polynomials(self).is_some()
     }

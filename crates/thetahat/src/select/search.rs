@@ -1,12 +1,13 @@
 //! Models that need a search, each from what its neighbours have found.
 //!
-//! A neighbour has one order less. Its parameters, and a zero, are parameters of the model with the same cost: so no model
-//! ends above a neighbour. (With two orders less, a pole and a zero that cancel would be added, and the gradient is
-//! zero there.) Models without such neighbours, and in the end the best ones, begin from the data as well.
+//! A neighbour has one order less. Its parameters, and a zero, are parameters of the model with the same cost: so no
+//! model ends above a neighbour. (With two orders less, a pole and a zero that cancel would be added, and the gradient
+//! is zero there.) Models without such neighbours, and in the end the best ones, begin from the data as well.
 //!
-//! A choice by a criterion need not fit all of them (branch and bound: Land and Doig, An automatic method of solving discrete
-//! programming problems, Econometrica 28, 1960). Models with the same plant differ in C and D, and none of them has a lower cost than the
-//! largest of them. So the largest are fitted first, and their cost with the price of a smaller model's parameters bounds its criterion.
+//! A choice by a criterion need not fit all of them (branch and bound: Land and Doig, An automatic method of solving
+//! discrete programming problems, Econometrica 28, 1960). Models with the same plant differ in C and D, and none of
+//! them has a lower cost than the largest of them. So the largest are fitted first, and their cost with the price of a
+//! smaller model's parameters bounds its criterion.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +26,8 @@ const ROUNDS: usize = 3;
 /// A cost that is above a neighbour's by more than this fraction is one of a worse minimum.
 const SAME: f64 = 1e-7;
 
-/// A model whose criterion is above the least by this many units of 2 ln(likelihood) has e^-10 of its probability, and is not fitted.
+/// A model whose criterion is above the least by this many units of 2 ln(likelihood) has e^-10 of its probability, and
+/// is not fitted.
 const HOPELESS: f64 = 20.0;
 
 /// The criterion of a model from its orders, its sum of squared errors and the price of its initial conditions.
@@ -42,7 +44,8 @@ pub(super) struct Family {
 }
 
 impl Family {
-    /// Of models that are sorted by their number of parameters. The coefficients of inputs after the first `inputs` are in all.
+    /// Of models that are sorted by their number of parameters. The coefficients of inputs after the first `inputs` are
+    /// in all.
     pub(super) fn new(models: &[Trial], inputs: usize) -> Self {
         let places: BTreeMap<Vec<usize>, usize> =
             models.iter().map(|model| key(&model.orders)).zip(0..).collect();
@@ -77,8 +80,9 @@ impl Family {
         Self { neighbours, levels, largest }
     }
 
-    /// Fits the models, from what is there of them and their neighbours. `score` says which are the best. With `essential` ones only
-    /// these and those that may have the least score are fitted, to `samples`. Gives how many were not.
+    /// Fits the models, from what is there of them and their neighbours. `score` says which are the best. With
+    /// `essential` ones only these and those that may have the least score are fitted, to `samples`. Gives how many
+    /// were not.
     ///
     /// # Errors
     /// [`Error::Interrupted`].

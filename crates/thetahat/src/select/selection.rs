@@ -56,18 +56,20 @@ pub struct Selection {
     pub best: Vec<Candidate>,
     /// The best of each number of parameters, the smallest first.
     pub of_size: Vec<Candidate>,
-    /// Free runs on blocks were compared in windows of this many samples, each with a level of its own, as the noise drifts; none where it
-    /// does not.
+    /// Free runs on blocks were compared in windows of this many samples, each with a level of its own, as the noise
+    /// drifts; none where it does not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level_window: Option<usize>,
-    /// Whether the noise of the model integrates, 1 - q^-1 in D in the place of a root that is estimated, as MDL is less with it.
+    /// Whether the noise of the model integrates, 1 - q^-1 in D in the place of a root that is estimated, as MDL is
+    /// less with it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub noise_integrates: bool,
-    /// The processes in continuous time that were compared with `chosen`, where the log is a step test, the best first. That one is
-    /// the model of the report, or `chosen` is.
+    /// The processes in continuous time that were compared with `chosen`, where the log is a step test, the best first.
+    /// That one is the model of the report, or `chosen` is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub processes: Vec<ProcessCandidate>,
-    /// The model in state space that was compared with `chosen`, where one was. It is the model of the report where it is far better.
+    /// The model in state space that was compared with `chosen`, where one was. It is the model of the report where it
+    /// is far better.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_space: Option<StateSpaceCandidate>,
 }
@@ -97,8 +99,8 @@ pub struct ProcessCandidate {
     pub mse: f64,
     /// MDL of the same.
     pub mdl: Option<f64>,
-    /// What it does on blocks that it was not fitted to, in the free run from the first row on; none where the rows without one do
-    /// not determine it.
+    /// What it does on blocks that it was not fitted to, in the free run from the first row on; none where the rows
+    /// without one do not determine it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOut>,
 }
@@ -129,8 +131,8 @@ pub struct Candidate {
 pub struct Best {
     /// The stable model with the least criterion.
     pub prediction: Candidate,
-    /// The stable model with the least error on samples that it was not fitted to, in free runs or as many steps ahead as the
-    /// focus says.
+    /// The stable model with the least error on samples that it was not fitted to, in free runs or as many steps ahead
+    /// as the focus says.
     pub simulation: Candidate,
 }
 
@@ -146,8 +148,8 @@ pub struct Delay {
     pub input: String,
     /// Samples from a change to its first effect; 1 where no effect is seen.
     pub nk: usize,
-    /// How sure that is: the posterior probability of this delay among those that were compared. None where no effect is
-    /// seen.
+    /// How sure that is: the posterior probability of this delay among those that were compared. None where no effect
+    /// is seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub confidence: Option<f64>,
     /// The MDL of models with a delay of 1, 2, … samples; of 0 too where that was taken.
@@ -163,13 +165,14 @@ pub struct DelayScore {
     pub mdl: f64,
 }
 
-/// How well a model does on samples that it was not fitted to: mean squares of errors, divided by the variance of the output.
+/// How well a model does on samples that it was not fitted to: mean squares of errors, divided by the variance of the
+/// output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
     /// On all blocks, each from the initial state that fits it best.
     pub blocks: f64,
-    /// On the last block, simulated from the first row on with the initial state that fits the rows before the block; for a
-    /// number of steps ahead the same as `blocks`.
+    /// On the last block, simulated from the first row on with the initial state that fits the rows before the block;
+    /// for a number of steps ahead the same as `blocks`.
     pub onward: f64,
     /// As `blocks`, without what instability costs.
     pub unpunished: f64,
@@ -185,8 +188,8 @@ impl HeldOut {
         f64::midpoint(logarithm(self.blocks), logarithm(self.onward))
     }
 
-    /// The fit that decides: 100 (1 - |e|/|y - mean(y)|), where the square of the ratio is the geometric mean of that on all blocks and that
-    /// onward.
+    /// The fit that decides: 100 (1 - |e|/|y - mean(y)|), where the square of the ratio is the geometric mean of that
+    /// on all blocks and that onward.
     pub fn percent(&self) -> f64 {
         100.0 * (1.0 - (0.5 * self.both()).exp())
     }

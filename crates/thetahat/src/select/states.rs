@@ -1,11 +1,12 @@
 //! A model in state space beside the polynomial models.
 //!
-//! The orders of polynomials that are compared end where searches become unsafe: a plant of many modes has more, and its states come from
-//! one factor whatever their number (see [`subspace`](crate::estimate::subspace())). So the order of the least MDL is fitted without each
-//! third of the rows, as polynomial models are (see `held_out`), and evaluated on it by its free run. It is taken where it is better than
-//! all of them by [`FAR`](super::winners::FAR): parameters of polynomials have standard errors, and a smaller fall says little. Free runs on later rows of 240
-//! simulated plants of order 1 to 3 became worse where the fall was 0.13 and 0.17, and no fall was above 0.3. Of 96 plants of two to eight
-//! modes 26 had more: these free runs fit better by 1.4 to 13 points, 6 in the mean.
+//! The orders of polynomials that are compared end where searches become unsafe: a plant of many modes has more, and
+//! its states come from one factor whatever their number (see [`subspace`](crate::estimate::subspace())). So the order
+//! of the least MDL is fitted without each third of the rows, as polynomial models are (see `held_out`), and evaluated
+//! on it by its free run. It is taken where it is better than all of them by [`FAR`](super::winners::FAR): parameters
+//! of polynomials have standard errors, and a smaller fall says little. Free runs on later rows of 240 simulated plants
+//! of order 1 to 3 became worse where the fall was 0.13 and 0.17, and no fall was above 0.3. Of 96 plants of two to
+//! eight modes 26 had more: these free runs fit better by 1.4 to 13 points, 6 in the mean.
 
 use std::borrow::Cow;
 
@@ -57,8 +58,9 @@ fn joint<'a>(record: &Record<'a>) -> JointRecord<'a> {
     JointRecord { inputs, outputs: vec![output], segments }
 }
 
-/// Compares the model in state space that has the least MDL with the polynomial model that was chosen; also gives its order where it is
-/// taken instead. Without a stable polynomial model that was evaluated on blocks there is nothing to compare it with.
+/// Compares the model in state space that has the least MDL with the polynomial model that was chosen; also gives its
+/// order where it is taken instead. Without a stable polynomial model that was evaluated on blocks there is nothing to
+/// compare it with.
 ///
 /// # Errors
 /// [`Error::Interrupted`].
@@ -120,7 +122,8 @@ fn candidate(
     Some((StateSpaceCandidate { order, parameters, orders: scores, held_out }, radius))
 }
 
-/// What models of an order do on blocks that they were not fitted to; none where the rows without one do not determine them.
+/// What models of an order do on blocks that they were not fitted to; none where the rows without one do not determine
+/// them.
 fn held_out(
     record: &Record<'_>,
     window: Option<usize>,

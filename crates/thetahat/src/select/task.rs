@@ -12,7 +12,8 @@ use crate::model::Orders;
 pub(crate) struct Task<'a> {
     pub(crate) estimation: &'a Record<'a>,
     pub(crate) validation: Option<&'a Record<'a>>,
-    /// The inputs' names. Both records have further inputs after these where a constant or a trend is part of every model.
+    /// The inputs' names. Both records have further inputs after these where a constant or a trend is part of every
+    /// model.
     pub(crate) inputs: &'a [String],
     pub(crate) select: Select,
     pub(crate) focus: Focus,
@@ -58,8 +59,8 @@ pub(crate) struct SelectedModel {
     pub(crate) selection: Selection,
     /// What was done because of what the records show.
     pub(crate) decisions: Vec<Decision>,
-    /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found them: a
-    /// start for the search on all samples.
+    /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found
+    /// them: a start for the search on all samples.
     pub(crate) guess: Option<Vec<f64>>,
 }
 

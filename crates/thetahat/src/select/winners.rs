@@ -1,17 +1,17 @@
 //! The choice between the best for prediction and the best for simulation.
 //!
-//! The model with the least MDL predicts well one step ahead. Where the plant is not among the models, another may simulate
-//! far better: errors one step ahead hardly show slow dynamics (Ljung, System Identification, 2nd ed. 1999, section 8.5).
-//! Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
+//! The model with the least MDL predicts well one step ahead. Where the plant is not among the models, another may
+//! simulate far better: errors one step ahead hardly show slow dynamics (Ljung, System Identification, 2nd ed. 1999,
+//! section 8.5). Errors of free runs alone choose badly too: they have few degrees of freedom. So there is a gate:
 //!
-//! 1. P has the least criterion among stable models. S has the least error where it was not fitted to (see `held_out`): the
-//!    mean of two logarithms, of the mean square on blocks and of that onward from the first row. Where C ended on the unit
-//!    circle, a search has stopped for want of room, at a point that rounding decides: such a model is no S.
-//! 2. S is taken where that mean is lower by more than [`FAR`] than with P, or by more than [`GATE`], both logarithms by half of
-//!    it, and the mean square on the blocks by more than [`STANDARD_ERRORS`] of its difference's; else P. (On blocks alone a slow
-//!    mode that only their initial states excite takes up what is noise.)
-//! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their errors
-//!    beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
+//! 1. P has the least criterion among stable models. S has the least error where it was not fitted to (see `held_out`):
+//!    the mean of two logarithms, of the mean square on blocks and of that onward from the first row. Where C ended on
+//!    the unit circle, a search has stopped for want of room, at a point that rounding decides: such a model is no S.
+//! 2. S is taken where that mean is lower by more than [`FAR`] than with P, or by more than [`GATE`], both logarithms
+//!    by half of it, and the mean square on the blocks by more than [`STANDARD_ERRORS`] of its difference's; else P.
+//!    (On blocks alone a slow mode that only their initial states excite takes up what is noise.)
+//! 3. An unstable model that has a lower criterion than P is taken where all its refits are unstable too and their
+//!    errors beat those of the choice by [`CLEARLY`] in the logarithm of the mean square: then the plant is unstable.
 
 use super::candidates::Compared;
 use super::held_out::standard_errors;

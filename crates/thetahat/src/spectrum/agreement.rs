@@ -24,15 +24,16 @@ pub struct Agreement {
 }
 
 impl MeasuredResponse {
-    /// Compares a model with the points of each input that both have. With d the difference of the two in real and imaginary part, S the
-    /// covariance of the measured one and P that of the model, a point lies outside where
+    /// Compares a model with the points of each input that both have. With d the difference of the two in real and
+    /// imaginary part, S the covariance of the measured one and P that of the model, a point lies outside where
     ///
     /// ```text
     /// d' (S + P)^-1 d > 5.99 (t/1.96)^2
     /// ```
     ///
-    /// with t the 95 % point of Student's distribution for the measured one ([`FrequencyPoint::excludes`]). Both see the same noise where the model was fitted to this
-    /// log: fewer lie outside then. Where the bands are not honest, more do.
+    /// with t the 95 % point of Student's distribution for the measured one ([`FrequencyPoint::excludes`]). Both see
+    /// the same noise where the model was fitted to this log: fewer lie outside then. Where the bands are not honest,
+    /// more do.
     ///
     /// # Errors
     /// [`Error::Argument`] if the model has another sample time, or a pole at one of the frequencies.
@@ -83,8 +84,8 @@ impl MeasuredResponse {
         Ok(self.overlaid(model)?.iter().filter_map(of_input).collect())
     }
 
-    /// The response of a model from each of the inputs that both have, at the frequencies of the points measured from it. Of its phases
-    /// those nearest to the measured ones.
+    /// The response of a model from each of the inputs that both have, at the frequencies of the points measured from
+    /// it. Of its phases those nearest to the measured ones.
     ///
     /// # Errors
     /// As for [`agreement`](Self::agreement).

@@ -49,7 +49,8 @@ pub(super) struct Found {
     pub(super) first: usize,
     /// From each input, or from one of them.
     pub(super) responses: Vec<Complex<f64>>,
-    /// The variances of their real parts, and of their imaginary parts, which are independent; none where there is no spread to tell.
+    /// The variances of their real parts, and of their imaginary parts, which are independent; none where there is no
+    /// spread to tell.
     pub(super) variances: Option<Vec<f64>>,
     /// Degrees of freedom of the variances.
     pub(super) degrees: usize,
@@ -107,8 +108,9 @@ impl CrossSpectra {
     /// G S_uu = s,   S_v = S_yy - G s^H,   gamma^2 = 1 - S_v/S_yy,   var G_j = S_v [S_uu^-1]_jj/(n - p)
     /// ```
     ///
-    /// For one input that is |G|^2 (1 - gamma^2)/((n - 1) gamma^2), half of it in the real and half in the imaginary part (Bendat and
-    /// Piersol, Random Data, 4th ed. 2010, section 9.2, with n - 1 for n as S_v is estimated too). The same holds of H2.
+    /// For one input that is |G|^2 (1 - gamma^2)/((n - 1) gamma^2), half of it in the real and half in the imaginary
+    /// part (Bendat and Piersol, Random Data, 4th ed. 2010, section 9.2, with n - 1 for n as S_v is estimated too). The
+    /// same holds of H2.
     pub(super) fn lines(&self, estimator: Estimator) -> Vec<Line> {
         let inputs = self.channels - 1;
         let powers = |j: usize| (0..self.angles.len()).map(move |line| self.value(line, j, j).re);

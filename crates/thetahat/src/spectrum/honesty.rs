@@ -26,15 +26,17 @@ impl Outside {
     }
 }
 
-/// Compares an estimate with the same of twice the resolution, line by line. Half the smoothing has twice the variance V, and what it
-/// adds is independent of the smoother estimate: the difference has the variance V of the smoother one, and without bias
+/// Compares an estimate with the same of twice the resolution, line by line. Half the smoothing has twice the variance
+/// V, and what it adds is independent of the smoother estimate: the difference has the variance V of the smoother one,
+/// and without bias
 ///
 /// ```text
 /// |G_fine - G|^2/V  ~  chi-square(2)
 /// ```
 ///
-/// with V that of the real part. A line counts as outside where that of an input is beyond the 95 % point (Bonferroni's, of several). The bias of a window falls with the square of its width:
-/// what is seen is three fourths of it. None if there is nothing to compare.
+/// with V that of the real part. A line counts as outside where that of an input is beyond the 95 % point
+/// (Bonferroni's, of several). The bias of a window falls with the square of its width: what is seen is three fourths
+/// of it. None if there is nothing to compare.
 pub(super) fn outside(lines: &[Line], finer: &[Line]) -> Option<Outside> {
     let mut outside = Outside { compared: 0, moved: Vec::new() };
     for (line, finer) in lines.iter().zip(finer) {

@@ -30,22 +30,23 @@ struct Segment {
     half_width: usize,
 }
 
-/// The local polynomial method (Pintelon, Schoukens, Vandersteen and Barbe, Mechanical Systems and Signal Processing 24 (2010) 573;
-/// Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, chapter 7). Around each frequency w, with
-/// x = (w_k - w)/b over the lines k of each segment's transform within the half-width b:
+/// The local polynomial method (Pintelon, Schoukens, Vandersteen and Barbe, Mechanical Systems and Signal Processing 24
+/// (2010) 573; Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, chapter 7).
+/// Around each frequency w, with x = (w_k - w)/b over the lines k of each segment's transform within the half-width b:
 ///
 /// ```text
 /// Y_k = sum_j (G_j + g_j1 x + g_j2 x^2) U_jk + t_0 + t_1 x + t_2 x^2 + V_k
 /// ```
 ///
-/// by least squares. The second polynomial is what a segment's ends leave: its transient, one for each segment. sum |V_k|^2 over its
-/// degrees of freedom is the noise, and what the polynomials miss is in it too. Beyond 0 and half the sampling frequency
-/// lines are the conjugates of those before.
+/// by least squares. The second polynomial is what a segment's ends leave: its transient, one for each segment.
+/// sum |V_k|^2 over its degrees of freedom is the noise, and what the polynomials miss is in it too. Beyond 0 and half
+/// the sampling frequency lines are the conjugates of those before.
 ///
 /// Cost: O(N log N), and O(n p^2) for each frequency, with 2 n + 1 lines and p polynomials.
 ///
 /// # Errors
-/// [`Error::Argument`] for a half-width that is too small for the polynomials; [`Error::Data`] if no segment has lines enough.
+/// [`Error::Argument`] for a half-width that is too small for the polynomials; [`Error::Data`] if no segment has lines
+/// enough.
 pub(super) fn lpm(signals: &Signals, half_width: Option<usize>, angles: &[f64]) -> Result<Estimate, Error> {
     let (inputs, longest) = (signals.inputs(), signals.longest());
     let unknown = TERMS * (inputs + 1);
@@ -113,8 +114,9 @@ pub(super) fn lpm(signals: &Signals, half_width: Option<usize>, angles: &[f64]) 
     Ok(Estimate { method: Method::Lpm { half_width: Some(half_width) }, lines, bands, words })
 }
 
-/// The lines of a segment around the nearest to an angle: those below 0 are the conjugates of those above it, and those beyond half the
-/// sampling frequency of those before. Those two themselves are left out: means are taken off, and the second is real.
+/// The lines of a segment around the nearest to an angle: those below 0 are the conjugates of those above it, and those
+/// beyond half the sampling frequency of those before. Those two themselves are left out: means are taken off, and the
+/// second is real.
 fn around(segment: &Segment, angle: f64) -> impl Iterator<Item = (isize, usize, bool)> {
     let (length, lines) = (segment.length as isize, segment.spectra[0].len() as isize);
     let nearest = (angle * segment.length as f64 / TAU).round() as isize;
@@ -193,8 +195,8 @@ fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Resul
         .flat_map(|j| (0..inputs).map(move |k| (j, k)))
         .map(|(j, k)| responses[j] * power[(j, k)] * responses[k].conj())
         .sum();
-    // G = a'Y, of which conjugate lines have conjugate noise: E |dG|^2 = sum |a_k|^2 v, E dG^2 = 2 sum a_k a_-k v. The variance is that of
-    // the direction in which it is largest.
+    // G = a'Y, of which conjugate lines have conjugate noise: E |dG|^2 = sum |a_k|^2 v, E dG^2 = 2 sum a_k a_-k v. The
+    // variance is that of the direction in which it is largest.
     let variance = |j: usize| {
         let row = TERMS * j;
         let weights = inverse.row(row) * q.adjoint();

@@ -17,8 +17,8 @@ const ROUNDING: f64 = 1e-9;
 const SHORTEST: usize = 16;
 /// Pieces of noise repeat themselves, too; they are not this fraction of a segment.
 const MOST: f64 = 0.8;
-/// A sine ends where it differs from the period before by more than this fraction of its amplitude; its end is where the difference leaves
-/// this many times its root mean square.
+/// A sine ends where it differs from the period before by more than this fraction of its amplitude; its end is where
+/// the difference leaves this many times its root mean square.
 const ENDS: f64 = 0.3;
 const LEAVES: f64 = 4.0;
 
@@ -30,7 +30,8 @@ pub(super) struct Pieces<'a> {
 }
 
 impl<'a> Pieces<'a> {
-    /// One piece if the inputs repeat themselves from end to end, else those that do, one after the other, if they are most of it.
+    /// One piece if the inputs repeat themselves from end to end, else those that do, one after the other, if they are
+    /// most of it.
     pub(super) fn of(signals: &'a Signals, segment: &Range<usize>) -> Vec<(Range<usize>, usize)> {
         match period(signals, segment) {
             Some(period) => vec![(segment.clone(), period)],
@@ -99,7 +100,8 @@ impl Iterator for Pieces<'_> {
     }
 }
 
-/// The fraction of the power of the inputs that changes from one period to the next: sum (u(t + P) - u(t))^2 over the power of the two.
+/// The fraction of the power of the inputs that changes from one period to the next: sum (u(t + P) - u(t))^2 over the
+/// power of the two.
 pub(super) fn repeats(signals: &Signals, rows: &Range<usize>, period: usize) -> f64 {
     let (mut change, mut power) = (0.0, 0.0);
     for input in &signals.channels[..signals.inputs()] {
@@ -113,8 +115,9 @@ pub(super) fn repeats(signals: &Signals, rows: &Range<usize>, period: usize) -> 
     if power > 0.0 { change / power } else { 0.0 }
 }
 
-/// The period of the inputs in some rows, if they repeat themselves at least once: the first lag at which the change of [`repeats`] is
-/// about the least of all lags up to half the rows (de Cheveigné and Kawahara, JASA 111 (2002) 1917). O(N log N).
+/// The period of the inputs in some rows, if they repeat themselves at least once: the first lag at which the change of
+/// [`repeats`] is about the least of all lags up to half the rows (de Cheveigné and Kawahara, JASA 111 (2002) 1917).
+/// O(N log N).
 fn period(signals: &Signals, rows: &Range<usize>) -> Option<usize> {
     let count = rows.len();
     if count < 4 {

@@ -57,12 +57,12 @@ pub enum Estimator {
 /// At which frequencies, in radians per second.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Frequencies {
-    /// All lines of a method that has lines of its own; of the others 200 from the first line of the longest segment's transform to
-    /// half the sampling frequency, each the same factor above the one before.
+    /// All lines of a method that has lines of its own; of the others 200 from the first line of the longest segment's
+    /// transform to half the sampling frequency, each the same factor above the one before.
     #[default]
     All,
-    /// Those from `low` to `high`. Methods without lines of their own have `points` of them, each the same factor above the one before;
-    /// 200 if that is none.
+    /// Those from `low` to `high`. Methods without lines of their own have `points` of them, each the same factor above
+    /// the one before; 200 if that is none.
     Between {
         /// The lowest.
         low: f64,
@@ -268,7 +268,8 @@ impl SpectrumPlan {
         Ok((low * sample_time, (high * sample_time).min(PI)))
     }
 
-    /// The angles for methods without lines of their own, in radians per sample; `first` is the lowest where none is given.
+    /// The angles for methods without lines of their own, in radians per sample; `first` is the lowest where none is
+    /// given.
     pub(super) fn angles(&self, sample_time: f64, first: f64) -> Result<Vec<f64>, Error> {
         let (low, high) = self.band(sample_time)?;
         match &self.frequencies {

@@ -11,7 +11,8 @@ use crate::document::document_methods;
 use crate::respond::FrequencyResponse;
 use crate::{Document, Error};
 
-/// The frequency response from each input to the output that a log shows, without a model. The JSON document `thetahat.response/1`.
+/// The frequency response from each input to the output that a log shows, without a model. The JSON document
+/// `thetahat.response/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasuredResponse {
     /// `thetahat.response/1`.
@@ -30,8 +31,9 @@ pub struct MeasuredResponse {
     pub method: Method,
     /// The output channel.
     pub output: String,
-    /// The response from each input, at the frequencies of `noise`; by `sines` at those of the input. Intervals of magnitude and phase are those of Student's
-    /// distribution, each for itself; real and imaginary part are independent and have the same variance.
+    /// The response from each input, at the frequencies of `noise`; by `sines` at those of the input. Intervals of
+    /// magnitude and phase are those of Student's distribution, each for itself; real and imaginary part are
+    /// independent and have the same variance.
     pub responses: Vec<FrequencyResponse>,
     /// What the inputs do not explain of the output.
     pub noise: Vec<NoisePoint>,
@@ -46,8 +48,8 @@ pub struct MeasuredResponse {
 pub struct NoisePoint {
     /// Radians per second.
     pub frequency: f64,
-    /// The one-sided power spectral density of the noise in units of the output squared per radian per second: its integral up to half
-    /// the sampling frequency is the variance. None where the method does not tell.
+    /// The one-sided power spectral density of the noise in units of the output squared per radian per second: its
+    /// integral up to half the sampling frequency is the variance. None where the method does not tell.
     pub density: Option<f64>,
     /// The multiple coherence: the fraction of the output's power at this frequency that the inputs explain, 0 to 1.
     pub coherence: Option<f64>,
@@ -58,8 +60,8 @@ pub struct NoisePoint {
 pub struct BandQuality {
     /// Whether they do; none where it is not known, or where there are no intervals.
     pub honest: Option<bool>,
-    /// The fraction of the points that leave their 95 % region when the resolution is doubled; by chance it is 0.05. None for methods
-    /// that have no resolution to double.
+    /// The fraction of the points that leave their 95 % region when the resolution is doubled; by chance it is 0.05.
+    /// None for methods that have no resolution to double.
     pub outside: Option<f64>,
     /// Why, in plain words.
     pub reason: String,

@@ -28,17 +28,19 @@ const FEEDBACK_ROWS: usize = 10_000;
 /// | `etfe` | Y/U at each line (Ljung 1999, section 6.3) | none |
 /// | `sines` | correlation over whole periods, once the transient is over | 95 %, from the spread between periods |
 ///
-/// Segments are cut at gaps of the clock, at missing values and where another log begins; nothing reaches from one into the next.
-/// Frequencies at which an input has no power, or inputs cannot be told apart, are left out, and a warning names them. Where an input
-/// follows the output the response is biased, and a warning says so. [`MeasuredResponse::bands`] says whether bands are honest: `spa` and
-/// `welch` are compared with themselves at twice the resolution.
+/// Segments are cut at gaps of the clock, at missing values and where another log begins; nothing reaches from one into
+/// the next. Frequencies at which an input has no power, or inputs cannot be told apart, are left out, and a warning
+/// names them. Where an input follows the output the response is biased, and a warning says so.
+/// [`MeasuredResponse::bands`] says whether bands are honest: `spa` and `welch` are compared with themselves at twice
+/// the resolution.
 ///
 /// Cost: O(N log N) for each channel.
 ///
 /// # Errors
-/// [`Error::Argument`] for a plan that does not make sense, or frequencies above half the sampling frequency; [`Error::Data`] for
-/// channels or rows that are not there, too few rows, a clock that is not uniform, or sines that are not whole periods;
-/// [`Error::Undetermined`] for an input that is constant or has no power at any frequency asked for.
+/// [`Error::Argument`] for a plan that does not make sense, or frequencies above half the sampling frequency;
+/// [`Error::Data`] for channels or rows that are not there, too few rows, a clock that is not uniform, or sines that
+/// are not whole periods; [`Error::Undetermined`] for an input that is constant or has no power at any frequency asked
+/// for.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};

@@ -6,8 +6,8 @@ use crate::Error;
 use crate::data::{Detrend, Log, Offset};
 use crate::figures::short;
 
-/// The deviations of inputs and output, the output last, each in units in which its largest is near 1: squares neither overflow nor
-/// vanish.
+/// The deviations of inputs and output, the output last, each in units in which its largest is near 1: squares neither
+/// overflow nor vanish.
 pub(super) struct Signals {
     /// One for each channel; what lies outside of the segments is as it was.
     pub(super) channels: Vec<Vec<f64>>,
@@ -19,8 +19,8 @@ pub(super) struct Signals {
 
 impl Signals {
     /// # Errors
-    /// [`Error::Undetermined`] for an input that is constant in all segments; [`Error::Data`] for a constant output, and as for an
-    /// [`Offset`].
+    /// [`Error::Undetermined`] for an input that is constant in all segments; [`Error::Data`] for a constant output,
+    /// and as for an [`Offset`].
     pub(super) fn new(
         log: &Log,
         inputs: &[String],

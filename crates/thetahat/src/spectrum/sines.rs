@@ -17,7 +17,8 @@ use crate::figures::{fixed, short};
 const FAINT: f64 = 1e-4;
 /// Nor are those whose mean over the periods has less than this many times its variance.
 const STEADY: f64 = 25.0;
-/// A period differs from the later ones by transients if it does so by this many times their own spread, or by this fraction.
+/// A period differs from the later ones by transients if it does so by this many times their own spread, or by this
+/// fraction.
 const SETTLED: f64 = 4.0;
 const SETTLED_EXACTLY: f64 = 1e-12;
 
@@ -27,13 +28,14 @@ const SETTLED_EXACTLY: f64 = 1e-12;
 /// U_m = sum_t u(t) exp(-i w t) over period m,   G = sum_m Y_m/sum_m U_m,   var G = sum_m |Y_m - G U_m|^2/(M (M - 1) |mean U|^2)
 /// ```
 ///
-/// at w = 2 pi l/P for each line l of the period of P rows at which exactly one input has power (Pintelon and Schoukens 2012, sections
-/// 2.4 and 2.5). Pieces of a segment that repeat themselves with a period each, as steps of the frequency do, are each their own
-/// experiment. Without a number, those first periods are left out that differ from the second half of the periods by more than these
-/// from one another. Also gives the rows that count. O(N log N).
+/// at w = 2 pi l/P for each line l of the period of P rows at which exactly one input has power (Pintelon and Schoukens
+/// 2012, sections 2.4 and 2.5). Pieces of a segment that repeat themselves with a period each, as steps of the
+/// frequency do, are each their own experiment. Without a number, those first periods are left out that differ from the
+/// second half of the periods by more than these from one another. Also gives the rows that count. O(N log N).
 ///
 /// # Errors
-/// [`Error::Data`] where an input does not repeat itself, a piece is shorter than what is left out, or two inputs share a line.
+/// [`Error::Data`] where an input does not repeat itself, a piece is shorter than what is left out, or two inputs share
+/// a line.
 pub(super) fn sines(
     signals: &Signals,
     names: &[String],

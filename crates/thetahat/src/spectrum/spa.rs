@@ -47,8 +47,8 @@ impl Covariances {
             }
             let products = (0..channels).flat_map(|a| (a..channels).map(move |b| (a, b))).zip(&mut values);
             for ((a, b), into) in products {
-                // The transform of a product's real and imaginary parts holds the covariances: r(tau) is that of exp(i ...), and a
-                // forward transform has them at -tau.
+                // The transform of a product's real and imaginary parts holds the covariances: r(tau) is that of exp(i
+                // ...), and a forward transform has them at -tau.
                 let product = spectra[a].iter().zip(&spectra[b]).map(|(a, b)| a * b.conj());
                 let found = transform.of(product.map(|product| (product.re, product.im)));
                 let weight = 1.0 / (length as f64 * samples as f64);
@@ -104,8 +104,9 @@ impl Covariances {
     }
 }
 
-/// The response by Blackman and Tukey's method. Without a number of lags it is twice the first of 16, 23, 32, … that leaves the response
-/// as it is when it is doubled, within what chance explains: bands that hold are worth more than the least error.
+/// The response by Blackman and Tukey's method. Without a number of lags it is twice the first of 16, 23, 32, … that
+/// leaves the response as it is when it is doubled, within what chance explains: bands that hold are worth more than
+/// the least error.
 ///
 /// # Errors
 /// [`Error::Argument`] for more lags than the longest segment has rows.

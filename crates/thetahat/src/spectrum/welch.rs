@@ -19,14 +19,15 @@ const OVERLAP: f64 = 1.0 / 36.0;
 /// The shortest window.
 const SHORTEST: usize = 8;
 
-/// Spectra of all channels by Welch's method (IEEE Transactions on Audio and Electroacoustics 15 (1967)), with Hann's window h:
+/// Spectra of all channels by Welch's method (IEEE Transactions on Audio and Electroacoustics 15 (1967)), with Hann's
+/// window h:
 ///
 /// ```text
 /// S_ab(2 pi k/L) = mean of A_k conj(B_k) / sum_t h(t)^2,   A_k = sum_t h(t) a(t) exp(-i 2 pi k t/L),   0 < k < L/2
 /// ```
 ///
-/// Windows overlap by half and lie within segments. K of them, P of which overlap with the next, count as K/(1 + P/(18 K)) independent
-/// ones. O(N log L) for each channel, in one pass.
+/// Windows overlap by half and lie within segments. K of them, P of which overlap with the next, count as K/(1 + P/(18
+/// K)) independent ones. O(N log L) for each channel, in one pass.
 pub(super) fn cross_spectra(signals: &Signals, length: usize, band: (f64, f64)) -> CrossSpectra {
     let step = length / 2;
     let windows = |rows: usize| if rows < length { 0 } else { (rows - length) / step + 1 };

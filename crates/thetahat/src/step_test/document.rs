@@ -72,8 +72,8 @@ pub struct StepResponse {
     pub correlation: f64,
     /// Which picture fits.
     pub shape: Shape,
-    /// The root mean square by which the response leaves that of a first order with the dead time and the time constant of the weighted
-    /// average, the noise taken off, as a fraction of the step. None where there is overshoot.
+    /// The root mean square by which the response leaves that of a first order with the dead time and the time constant
+    /// of the weighted average, the noise taken off, as a fraction of the step. None where there is overshoot.
     pub misfit: Option<f64>,
     /// What is read off it, by each method.
     pub estimates: Vec<StepEstimate>,
@@ -113,7 +113,8 @@ pub struct StepSummary {
     pub method: StepMethod,
     /// How many steps have it.
     pub steps: usize,
-    /// The mean over them. Its standard error is the larger of what the spread between steps and what the noise in each says.
+    /// The mean over them. Its standard error is the larger of what the spread between steps and what the noise in each
+    /// says.
     pub value: Quantity,
     /// The standard deviation between steps; none for one step.
     pub spread: Option<f64>,

@@ -18,22 +18,24 @@ use crate::model::Quantity;
 const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
 /// In more than the last of them it moves by no more than this fraction of the step: a longer part has to be worth it.
 const RESTS: f64 = 0.002;
-/// The regime is the last part of the rows after a step; of a response without overshoot all rows after this many rise times, which are
-/// six time constants of a first order.
+/// The regime is the last part of the rows after a step; of a response without overshoot all rows after this many rise
+/// times, which are six time constants of a first order.
 const LAST: f64 = 0.2;
 const OVER: f64 = 2.7;
 /// Fewer rows are no level and no response.
 const BEFORE: usize = 4;
 const AFTER: usize = 12;
-/// At rest the output moves by no more than this fraction of the step, as far as can be told with this many standard errors.
+/// At rest the output moves by no more than this fraction of the step, as far as can be told with this many standard
+/// errors.
 const MOVES: f64 = 0.015;
 const ERRORS: f64 = 3.0;
 /// A larger standard error, as a fraction of the step, is that of a transient rather than of noise.
 const KNOWN: f64 = 0.03;
-/// Nor has a response without overshoot reached its regime this many rise times after it began: three time constants of a first order,
-/// what noise lets one see or not.
+/// Nor has a response without overshoot reached its regime this many rise times after it began: three time constants of
+/// a first order, what noise lets one see or not.
 const UNFINISHED: f64 = 1.35;
-/// A change of the output is lost in noise below this many standard deviations of it, or this many of its own standard errors.
+/// A change of the output is lost in noise below this many standard deviations of it, or this many of its own standard
+/// errors.
 const LOST: f64 = 2.0;
 const LOST_MEAN: f64 = 4.0;
 /// What noise makes of a level is rounding below this fraction of the range of the output.
@@ -172,8 +174,8 @@ fn levels_of(section: &Section, jump: &Jump) -> Result<Levels, String> {
     Ok(level(part))
 }
 
-/// By how much the straight line through some values moves over them, and the standard error of that, with the colour of what it leaves;
-/// that of white noise at least, as few rows may look less noisy by chance.
+/// By how much the straight line through some values moves over them, and the standard error of that, with the colour
+/// of what it leaves; that of white noise at least, as few rows may look less noisy by chance.
 fn moves(time: &[f64], values: &[f64]) -> (f64, f64) {
     let count = time.len() as f64;
     let (middle, level) = (time.iter().sum::<f64>() / count, values.iter().sum::<f64>() / count);

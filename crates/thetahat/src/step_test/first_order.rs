@@ -13,14 +13,17 @@ const NEAR: f64 = 1.4;
 const TANGENT: f64 = 0.7;
 /// Among how many places the inflection is looked for.
 const SCANNED: u32 = 80;
-/// The transient of averages, in time constants: less at its end where noise is large, as the logarithm needs 1 - s above it.
+/// The transient of averages, in time constants: less at its end where noise is large, as the logarithm needs 1 - s
+/// above it.
 const BEGINS: f64 = 0.2;
 const ENDS: f64 = 3.0;
 const ABOVE_NOISE: f64 = 2.5;
-/// The transient over which a misfit is taken, in time constants, and from which fraction of the step on a first order does not fit.
+/// The transient over which a misfit is taken, in time constants, and from which fraction of the step on a first order
+/// does not fit.
 const COMPARED: f64 = 4.0;
 const MISFIT: f64 = 0.02;
-/// A dead time that is not as many standard errors above 0 counts as none, and less than this fraction of a step of the clock is none.
+/// A dead time that is not as many standard errors above 0 counts as none, and less than this fraction of a step of the
+/// clock is none.
 const ABOVE_ZERO: f64 = 2.0;
 const RESOLUTION: f64 = 0.05;
 /// The weights of an average settle in this many rounds.
@@ -63,7 +66,8 @@ pub(super) fn crossings(response: &Response<'_>, end: f64) -> Option<Crossings> 
     })
 }
 
-/// A dead time as other figures take it: none where it cannot be told from that; and as it is reported, with its spread.
+/// A dead time as other figures take it: none where it cannot be told from that; and as it is reported, with its
+/// spread.
 pub(super) fn dead_time(response: &Response<'_>, found: Influence) -> [Influence; 2] {
     let resolution = response.time.get(1).map_or(0.0, |step| RESOLUTION * step);
     if found.value > (ABOVE_ZERO * response.spread(&found)).max(resolution) {
@@ -166,8 +170,8 @@ fn misfit(response: &Response<'_>, theta: f64, tau: f64) -> f64 {
     (square / rows - chance).max(0.0).sqrt()
 }
 
-/// Where the tangent of the largest slope leaves 0, and the time that it takes from there to 1. A first order has its largest slope at the
-/// start, an S at its inflection.
+/// Where the tangent of the largest slope leaves 0, and the time that it takes from there to 1. A first order has its
+/// largest slope at the start, an S at its inflection.
 fn tangent(response: &Response<'_>, theta: f64, tau: f64, shape: Shape) -> Option<(Influence, Influence)> {
     let half = 0.5 * TANGENT * tau;
     let at = |centre: f64| Local::fit(response.time, &response.values, centre, half);

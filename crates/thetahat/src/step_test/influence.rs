@@ -2,8 +2,8 @@
 
 use thetahat_core::nalgebra::{Matrix3, Vector3};
 
-/// A figure, and its derivatives by the rows of the response: what its spread follows from, and that of sums and differences of figures,
-/// which share rows.
+/// A figure, and its derivatives by the rows of the response: what its spread follows from, and that of sums and
+/// differences of figures, which share rows.
 #[derive(Debug, Clone)]
 pub(super) struct Influence {
     pub(super) value: f64,
@@ -29,7 +29,8 @@ impl Influence {
     }
 }
 
-/// The parabola a + b x + c x^2 of least squares through some rows, with x = (t - centre)/half; c = 0 for a straight line.
+/// The parabola a + b x + c x^2 of least squares through some rows, with x = (t - centre)/half; c = 0 for a straight
+/// line.
 #[derive(Debug)]
 pub(super) struct Local {
     pub(super) coefficients: [f64; 3],
@@ -40,8 +41,8 @@ pub(super) struct Local {
 }
 
 impl Local {
-    /// Through the rows with times in centre - half … centre + half: a straight line through two to four rows, else a parabola. None for
-    /// fewer rows.
+    /// Through the rows with times in centre - half … centre + half: a straight line through two to four rows, else a
+    /// parabola. None for fewer rows.
     pub(super) fn fit(time: &[f64], values: &[f64], centre: f64, half: f64) -> Option<Self> {
         let first = time.partition_point(|t| *t < centre - half);
         let end = time.partition_point(|t| *t <= centre + half);

@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// A level has this many rows at least.
 const FEWEST: usize = 4;
-/// A value belongs to a level if it is no farther from its mean than this many standard deviations of the noise, or than this fraction
-/// of the range of the input.
+/// A value belongs to a level if it is no farther from its mean than this many standard deviations of the noise, or
+/// than this fraction of the range of the input.
 const NOISE: f64 = 6.0;
 const SAME: f64 = 0.01;
 /// A level does not move by more than this fraction of the step from it.
@@ -39,7 +39,8 @@ pub(super) struct Jump {
     pub(super) taken: usize,
 }
 
-/// The standard deviation of the noise on an input that jumps seldom: from the median of its changes, which noise alone makes.
+/// The standard deviation of the noise on an input that jumps seldom: from the median of its changes, which noise alone
+/// makes.
 pub(super) fn noise(input: &[f64]) -> f64 {
     // The median of |x| of a standard normal number, and two values in each change.
     const MEDIAN: f64 = 0.674_489_750_196_081_7 * std::f64::consts::SQRT_2;
@@ -52,8 +53,9 @@ pub(super) fn noise(input: &[f64]) -> f64 {
     *median / MEDIAN
 }
 
-/// The steps of an input: from one level to the next, where both are held, are flat, and the way between them is short. What lies between
-/// levels, such as the ramp of an actuator, is part of the step; it counts from the row in which the input leaves the level. O(N).
+/// The steps of an input: from one level to the next, where both are held, are flat, and the way between them is short.
+/// What lies between levels, such as the ramp of an actuator, is part of the step; it counts from the row in which the
+/// input leaves the level. O(N).
 pub(super) fn moves(input: &[f64]) -> Moves {
     let (low, high) =
         input.iter().fold((f64::MAX, f64::MIN), |(low, high), value| (value.min(low), value.max(high)));

@@ -16,11 +16,12 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    /// From what is left of the output where it is at rest: the variance about the mean of each part, and the correlation of an
-    /// autoregression A(q) e = w whose order is that of the least description length. With g the impulse response of 1/A the covariance at
-    /// lag k is proportional to sum_j g_j g_{j+k}, so that no combination of rows has a negative variance. Of values that are multiples of
-    /// a `step`, 0 of others, noise that is less than a step is that of rounding, which stays the same while the output rests: of variance
-    /// step^2/12 (Widrow and Kollar, Quantization Noise, 2008, section 5.2) at all lags. O(N).
+    /// From what is left of the output where it is at rest: the variance about the mean of each part, and the
+    /// correlation of an autoregression A(q) e = w whose order is that of the least description length. With g the
+    /// impulse response of 1/A the covariance at lag k is proportional to sum_j g_j g_{j+k}, so that no combination of
+    /// rows has a negative variance. Of values that are multiples of a `step`, 0 of others, noise that is less than a
+    /// step is that of rounding, which stays the same while the output rests: of variance step^2/12 (Widrow and Kollar,
+    /// Quantization Noise, 2008, section 5.2) at all lags. O(N).
     pub(super) fn of(parts: &[&[f64]], step: f64) -> Self {
         let (mut left, mut segments, mut degrees) = (Vec::new(), Vec::new(), 0);
         for part in parts.iter().filter(|part| part.len() > 1) {

@@ -10,7 +10,8 @@ const WIDER: [f64; 4] = [1.0, 1.5, 2.2, 3.3];
 const RISES: f64 = 3.0;
 /// Windows are no narrower than this many steps of the clock to either side.
 const NARROWEST: f64 = 1.6;
-/// The band of the noise, in standard deviations, and how many rows in a row are outside of it once the response has begun.
+/// The band of the noise, in standard deviations, and how many rows in a row are outside of it once the response has
+/// begun.
 const BAND: f64 = 3.0;
 const OUTSIDE: usize = 3;
 /// What counts as settled, and the standard error with which that can be seen.
@@ -35,8 +36,8 @@ pub(super) struct Response<'a> {
 }
 
 impl Response<'_> {
-    /// The standard error of a figure: from the noise of its rows, and from the levels, by which ds/dbefore = -(1 - s)/change and
-    /// ds/dregime = -s/change.
+    /// The standard error of a figure: from the noise of its rows, and from the levels, by which ds/dbefore = -(1 -
+    /// s)/change and ds/dregime = -s/change.
     pub(super) fn spread(&self, figure: &Influence) -> f64 {
         let weights = &figure.weights;
         let regime: f64 = weights.iter().zip(&self.values).map(|(weight, s)| weight * s).sum();
@@ -57,7 +58,8 @@ impl Response<'_> {
         self.time[rows - 1] / (rows - 1) as f64
     }
 
-    /// The first time at which a mean over some rows is above one half, and how many rows that is: the scale of the response.
+    /// The first time at which a mean over some rows is above one half, and how many rows that is: the scale of the
+    /// response.
     pub(super) fn half_time(&self) -> Option<(f64, usize)> {
         let mut run = 0;
         let first = self.values.iter().position(|s| {
@@ -82,14 +84,15 @@ impl Response<'_> {
             .collect()
     }
 
-    /// How long it is below a level before `end`: where it is reached, if that happens once; noise moves it to either side alike.
+    /// How long it is below a level before `end`: where it is reached, if that happens once; noise moves it to either
+    /// side alike.
     pub(super) fn time_below(&self, level: f64, end: f64) -> f64 {
         let rows = self.time.windows(2).zip(&self.values).take_while(|(pair, _)| pair[0] < end);
         rows.filter(|(_, s)| **s < level).map(|(pair, _)| pair[1] - pair[0]).sum()
     }
 
-    /// Where a level is reached before `end`: on the parabola through the rows around it, as many as show that it rises, and no farther
-    /// away than `most`.
+    /// Where a level is reached before `end`: on the parabola through the rows around it, as many as show that it
+    /// rises, and no farther away than `most`.
     pub(super) fn crossing(&self, level: f64, end: f64, rise: f64, most: f64) -> Option<Influence> {
         let rough = self.time_below(level, end);
         WIDER.into_iter().find_map(|wider| {
@@ -109,8 +112,8 @@ impl Response<'_> {
         })
     }
 
-    /// The last row before the response leaves the band of the noise for good, and the spread of that: late by the time that it takes to
-    /// the band.
+    /// The last row before the response leaves the band of the noise for good, and the spread of that: late by the time
+    /// that it takes to the band.
     pub(super) fn leaves_noise(&self, rise: f64) -> Option<(f64, f64)> {
         let band = (BAND * self.deviation()).max(1e-9);
         let mut run = 0;
@@ -125,7 +128,8 @@ impl Response<'_> {
         Some((self.time[at], (step * step / 12.0 + noisy * noisy).sqrt()))
     }
 
-    /// After which time it stays within 2 % of the regime, by means over as few rows as show that; none if noise hides it.
+    /// After which time it stays within 2 % of the regime, by means over as few rows as show that; none if noise hides
+    /// it.
     pub(super) fn settles(&self, rise: f64) -> Option<Influence> {
         let step = self.step(self.time[self.time.len() - 1]);
         let most = (WIDEST * rise / step) as usize;

@@ -40,25 +40,26 @@ impl StepTestPlan {
 
 /// Finds the steps of an input and reads off the response to each what a course does.
 ///
-/// A step is a jump of the input from a level that it holds to another; noise on the input below the size of its steps does not matter. The
-/// clock may be irregular. The response is s = (y - y0)/(y1 - y0) with y0 the mean before and y1 the mean of the regime. [`StepFigure`]
-/// and [`StepMethod`] list what is read off it, and how.
+/// A step is a jump of the input from a level that it holds to another; noise on the input below the size of its steps
+/// does not matter. The clock may be irregular. The response is s = (y - y0)/(y1 - y0) with y0 the mean before and y1
+/// the mean of the regime. [`StepFigure`] and [`StepMethod`] list what is read off it, and how.
 ///
-/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of what is left of the output at rest,
-/// before the step and in the regime, go through the derivatives of each figure by each row, and so do the errors of y0 and y1. They hold for the
-/// model that a way takes for granted; what a wrong one does they do not say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
+/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of what is left of
+/// the output at rest, before the step and in the regime, go through the derivatives of each figure by each row, and so
+/// do the errors of y0 and y1. They hold for the model that a way takes for granted; what a wrong one does they do not
+/// say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
 ///
-/// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before it, the regime is
-/// not reached, the change is lost in the noise, rows are too few.
+/// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before
+/// it, the regime is not reached, the change is lost in the noise, rows are too few.
 ///
-/// Beside them stands the process with the least squared errors over all rows ([`FittedProcess`]): of first order with a dead time, or of
-/// second order, as the responses look.
+/// Beside them stands the process with the least squared errors over all rows ([`FittedProcess`]): of first order with
+/// a dead time, or of second order, as the responses look.
 ///
 /// Cost: O(N) for each step, times the rows over which the noise is correlated.
 ///
 /// # Errors
-/// [`Error::Data`] for channels or rows that are not there, and an input without a step; [`Error::Argument`] for rows that overlap;
-/// [`Error::Undetermined`] if no step has a response that can be evaluated.
+/// [`Error::Data`] for channels or rows that are not there, and an input without a step; [`Error::Argument`] for rows
+/// that overlap; [`Error::Undetermined`] if no step has a response that can be evaluated.
 ///
 /// ```
 /// use thetahat::data::{Channel, Log};

@@ -7,8 +7,8 @@ use super::first_order::dead_time;
 use super::influence::{Influence, Local};
 use super::response::Response;
 
-/// Half of the rows of a parabola over a peak, as a fraction of the time from half of the change to the first peak: about a quarter of the
-/// half period.
+/// Half of the rows of a parabola over a peak, as a fraction of the time from half of the change to the first peak:
+/// about a quarter of the half period.
 const OVER: f64 = 0.4;
 /// A peak is one if it is this many standard errors from the regime, and this fraction of the change.
 const ABOVE: f64 = 4.0;
@@ -59,16 +59,16 @@ fn highest(
     (above.value > (ABOVE * response.spread(&above)).max(LEAST)).then_some(Peak { above, time, half })
 }
 
-/// Damping and frequency of a second order 1/(1 + 2 zeta s/omega + s^2/omega^2) with a dead time. With OS the overshoot, t_p the time of
-/// the first peak, T the time from it to the second one and d = ln(OS_1/OS_2):
+/// Damping and frequency of a second order 1/(1 + 2 zeta s/omega + s^2/omega^2) with a dead time. With OS the
+/// overshoot, t_p the time of the first peak, T the time from it to the second one and d = ln(OS_1/OS_2):
 ///
 /// ```text
 /// zeta = -ln OS/sqrt(pi^2 + ln^2 OS)    or   d/sqrt(4 pi^2 + d^2)
 /// omega = pi/((t_p - theta) sqrt(1 - zeta^2))   or   2 pi/(T sqrt(1 - zeta^2))
 /// ```
 ///
-/// (Ogata, Modern Control Engineering, 5th ed. 2010, section 5.3.) The dead time follows from where half of the change is reached: at the
-/// fraction r(zeta) of the time from theta to t_p.
+/// (Ogata, Modern Control Engineering, 5th ed. 2010, section 5.3.) The dead time follows from where half of the change
+/// is reached: at the fraction r(zeta) of the time from theta to t_p.
 pub(super) fn second_order(
     response: &Response<'_>,
     peak: &Peak,
@@ -81,8 +81,8 @@ pub(super) fn second_order(
     let damping = peak.above.mapped(-log / length, -PI * PI / (overshoot * length.powi(3)));
     let r = half_time(damping.value);
     let begins_of = |time: &Influence| Influence::combined(1.0 / (1.0 - r), half, -r / (1.0 - r), time);
-    // The peak is steeper before than after: by its third derivative the parabola over half to either side is late by a omega_d half^2/5,
-    // with a = zeta/sqrt(1 - zeta^2).
+    // The peak is steeper before than after: by its third derivative the parabola over half to either side is late by a
+    // omega_d half^2/5, with a = zeta/sqrt(1 - zeta^2).
     let skew = damping.value / (1.0 - damping.value * damping.value).sqrt();
     let angular = PI / (peak.time.value - begins_of(&peak.time).value.max(0.0));
     let late = skew * angular * peak.half * peak.half / 5.0;
@@ -126,7 +126,8 @@ fn frequency(angle: f64, time: &Influence, damping: &Influence) -> Influence {
     Influence { value, ..moved }
 }
 
-/// Where a second order reaches half of its change, as a fraction of the time to its peak: by halving, as it rises all that time.
+/// Where a second order reaches half of its change, as a fraction of the time to its peak: by halving, as it rises all
+/// that time.
 fn half_time(damping: f64) -> f64 {
     let slope = damping / (1.0 - damping * damping).sqrt();
     let at = |angle: f64| 1.0 - (-slope * angle).exp() * (angle.cos() + slope * angle.sin());

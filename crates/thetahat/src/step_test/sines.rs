@@ -12,16 +12,17 @@ use crate::{Document, Error};
 /// Two frequencies farther apart than this factor leave much to the interpolation.
 const APART: f64 = 4.0;
 
-/// The time constant of a first order K/(1 + i omega tau) from a measured frequency response, such as that of sines one after the other:
-/// tau = 1/omega at the frequency where the phase is -45 degrees, between two measured frequencies on the line of tan(phase) over omega,
-/// which a first order follows. The gain is the magnitude there times sqrt(2).
+/// The time constant of a first order K/(1 + i omega tau) from a measured frequency response, such as that of sines one
+/// after the other: tau = 1/omega at the frequency where the phase is -45 degrees, between two measured frequencies on
+/// the line of tan(phase) over omega, which a first order follows. The gain is the magnitude there times sqrt(2).
 ///
-/// The sign of the gain is that of the response at the lowest frequency. A dead time turns the phase by omega theta more, and makes the time
-/// constant too large by about 2 theta: the document says so. The standard error follows from those of the two phases. O(points).
+/// The sign of the gain is that of the response at the lowest frequency. A dead time turns the phase by omega theta
+/// more, and makes the time constant too large by about 2 theta: the document says so. The standard error follows from
+/// those of the two phases. O(points).
 ///
 /// # Errors
-/// [`Error::Argument`] for an input that the response is not from; [`Error::Undetermined`] where the phase does not pass -45 degrees between
-/// two of the frequencies.
+/// [`Error::Argument`] for an input that the response is not from; [`Error::Undetermined`] where the phase does not
+/// pass -45 degrees between two of the frequencies.
 pub fn sine_test(found: &MeasuredResponse, input: &str) -> Result<StepTest, Error> {
     let Some(response) = found.from_input(input) else {
         let there = found.responses.iter().filter_map(|response| response.input.as_deref());

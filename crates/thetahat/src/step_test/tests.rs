@@ -14,8 +14,8 @@ fn timed(time: &[f64], u: Vec<f64>, y: Vec<f64>) -> Log {
     Log::recorded(vec![channel("u", u), channel("y", y)], time.to_vec()).unwrap()
 }
 
-/// The response of a plant with a gain of 2 and an offset of 5 to steps at these times, from 1 to 3 and back; `at` is its unit step
-/// response.
+/// The response of a plant with a gain of 2 and an offset of 5 to steps at these times, from 1 to 3 and back; `at` is
+/// its unit step response.
 fn stepped(time: &[f64], steps: &[f64], at: impl Fn(f64) -> f64, mut noise: impl FnMut() -> f64) -> Log {
     let passed = |t: f64| steps.iter().filter(move |step| **step <= t);
     let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };

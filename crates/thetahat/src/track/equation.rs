@@ -2,8 +2,8 @@
 
 use crate::model::Orders;
 
-/// The orders of one equation as its estimator has them. With several outputs na samples of each, its own among them, come before
-/// the inputs, as inputs that act at once: what they were a row before.
+/// The orders of one equation as its estimator has them. With several outputs na samples of each, its own among them,
+/// come before the inputs, as inputs that act at once: what they were a row before.
 pub(super) fn equation(orders: &Orders, outputs: usize) -> Orders {
     if outputs == 0 {
         return orders.clone();

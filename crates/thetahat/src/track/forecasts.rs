@@ -3,14 +3,16 @@
 use super::tracker::{Stage, Tracker, check_steps};
 use crate::Error;
 
-/// The predictions this many steps ahead of the outputs of one model: y(k + steps) from the samples up to k, in the units of each. The
-/// trackers are those of its outputs, in their order, after the same rows. Inputs to come are held at their latest values.
+/// The predictions this many steps ahead of the outputs of one model: y(k + steps) from the samples up to k, in the
+/// units of each. The trackers are those of its outputs, in their order, after the same rows. Inputs to come are held
+/// at their latest values.
 ///
-/// NaN if there is none, as for [`Tracker::forecast`]; of coupled outputs for all of them, where it is so for one. n multiply-adds
-/// and moves a step and output. It takes memory for the delay lines.
+/// NaN if there is none, as for [`Tracker::forecast`]; of coupled outputs for all of them, where it is so for one. n
+/// multiply-adds and moves a step and output. It takes memory for the delay lines.
 ///
 /// # Errors
-/// [`Error::Argument`] if the steps are not in 1 … 10,000, or the trackers are not as many as the outputs that they are coupled with.
+/// [`Error::Argument`] if the steps are not in 1 … 10,000, or the trackers are not as many as the outputs that they are
+/// coupled with.
 ///
 /// See [`Tracker::coupled`] for an example.
 pub fn forecasts(trackers: &mut [Tracker], steps: usize) -> Result<Vec<f64>, Error> {

@@ -22,21 +22,22 @@ pub struct TrackPlan {
     pub dead_zone: f64,
     /// What becomes of samples whose innovations are far larger than the noise makes them.
     pub outliers: TrackOutliers,
-    /// Whether a constant is estimated beside the model: A y = B u + constant + C e, for signals whose offsets are not known.
+    /// Whether a constant is estimated beside the model: A y = B u + constant + C e, for signals whose offsets are not
+    /// known.
     pub constant: bool,
-    /// What is taken from each channel before, in its own units, and put back in predictions. None: what the report says;
-    /// without a report nothing, or with a constant the first value of each channel. (Far from 0, signals that hardly change
-    /// look like one constant: the prior would pull at what tells them apart.)
+    /// What is taken from each channel before, in its own units, and put back in predictions. None: what the report
+    /// says; without a report nothing, or with a constant the first value of each channel. (Far from 0, signals that
+    /// hardly change look like one constant: the prior would pull at what tells them apart.)
     pub offsets: Option<PerChannel>,
-    /// The typical magnitude of each channel without its offset, in its own units, 1e-98 to 1e98. None: found in the first
-    /// rows, or in the report.
+    /// The typical magnitude of each channel without its offset, in its own units, 1e-98 to 1e98. None: found in the
+    /// first rows, or in the report.
     pub scales: Option<PerChannel>,
-    /// The typical magnitude of e, in the output's units, 1e-98 to 1e98; only a model with C asks for it. None: a tenth of
-    /// that of the output, or what the report says.
+    /// The typical magnitude of e, in the output's units, 1e-98 to 1e98; only a model with C asks for it. None: a tenth
+    /// of that of the output, or what the report says.
     pub noise_scale: Option<f64>,
-    /// Whether to watch for changes, and how many samples shall be between two false alarms on average, 10 to 1e9. With a short
-    /// memory they come more seldom: with 4 parameters and a factor of 0.99 about half as often as asked (measured). See
-    /// [`change_detector`](crate::track::change_detector).
+    /// Whether to watch for changes, and how many samples shall be between two false alarms on average, 10 to 1e9. With
+    /// a short memory they come more seldom: with 4 parameters and a factor of 0.99 about half as often as asked
+    /// (measured). See [`change_detector`](crate::track::change_detector).
     pub alarm_interval: Option<f64>,
 }
 
@@ -90,11 +91,12 @@ impl TrackMethod {
     }
 }
 
-/// What a tracker forgets, written as a word and its numbers, with a colon before each: `none`, `selective:0.99`. The words and
-/// numbers are those of [`Forgetting::policies`]; a factor alone is that of `exponential`, and 1 alone is `none`.
+/// What a tracker forgets, written as a word and its numbers, with a colon before each: `none`, `selective:0.99`. The
+/// words and numbers are those of [`Forgetting::policies`]; a factor alone is that of `exponential`, and 1 alone is
+/// `none`.
 ///
-/// What is written is read back as the same. That a factor is above n/(n + 1), for n parameters, is checked when a tracker is
-/// made.
+/// What is written is read back as the same. That a factor is above n/(n + 1), for n parameters, is checked when a
+/// tracker is made.
 ///
 /// ```
 /// use thetahat::thetahat_core::Forgetting;
@@ -109,8 +111,8 @@ impl TrackMethod {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Policy(pub Forgetting<f64>);
 
-/// How a tracker starts, written as a word: `standard`, `exact`, `mixed` or `mixed:K`, with K samples in which the prior is
-/// taken out. See [`RlsStart`].
+/// How a tracker starts, written as a word: `standard`, `exact`, `mixed` or `mixed:K`, with K samples in which the
+/// prior is taken out. See [`RlsStart`].
 ///
 /// ```
 /// use thetahat::thetahat_core::RlsStart;
@@ -129,9 +131,9 @@ impl Default for TrackStart {
     }
 }
 
-/// What becomes of outliers, written as a word: `used`, `huber` or `huber:THRESHOLD` in standard deviations, `gate`, `gate:NIS` or
-/// `gate:NIS:RELEASE`. Alone `huber` is `huber:3`, `gate` is `gate:25:20` and `gate:NIS` is released after 20 in a row. See
-/// [`Outliers`].
+/// What becomes of outliers, written as a word: `used`, `huber` or `huber:THRESHOLD` in standard deviations, `gate`,
+/// `gate:NIS` or `gate:NIS:RELEASE`. Alone `huber` is `huber:3`, `gate` is `gate:25:20` and `gate:NIS` is released
+/// after 20 in a row. See [`Outliers`].
 ///
 /// ```
 /// use thetahat::thetahat_core::Outliers;

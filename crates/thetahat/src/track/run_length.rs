@@ -13,9 +13,9 @@
 //! integral from y to y + d of (t - y)/d dF(t - x) = F(y + d - x) - (G(y + d - x) - G(y - x))/d
 //! ```
 //!
-//! so that a density that is infinite somewhere, such as that of chi-square with one degree of freedom, does no harm (as it
-//! does to the Markov chain of Brook and Evans 1972, which takes L for constant between points). The error falls as 1/m^2,
-//! and what is left of it is taken off by comparing two m.
+//! so that a density that is infinite somewhere, such as that of chi-square with one degree of freedom, does no harm
+//! (as it does to the Markov chain of Brook and Evans 1972, which takes L for constant between points). The error falls
+//! as 1/m^2, and what is left of it is taken off by comparing two m.
 
 use std::f64::consts::{LN_2, PI, SQRT_2};
 
@@ -31,8 +31,9 @@ const SEGMENTS: usize = 240;
 const PRECISION: f64 = 1e-6;
 
 /// The charts that give one false alarm in `interval` samples on average, all together, if the innovations are Gaussian
-/// and as large as their variance says. With one output half of the alarms are from the two charts of the mean, half from that
-/// of the variance. With L the average run length of a chart, the mean number of samples until it gives a false alarm,
+/// and as large as their variance says. With one output half of the alarms are from the two charts of the mean, half
+/// from that of the variance. With L the average run length of a chart, the mean number of samples until it gives a
+/// false alarm,
 ///
 /// ```text
 /// mean up       L = 4 interval
@@ -40,24 +41,24 @@ const PRECISION: f64 = 1e-6;
 /// variance      L = 2 interval
 /// ```
 ///
-/// Rates add: 1/(4 interval) + 1/(4 interval) + 1/(2 interval) = 1/interval. So they do for the two charts of the mean (Kemp,
-/// The average run length of the cumulative sum chart when a V-mask is used, J. R. Statist. Soc. B 23, 1961); with the chart
-/// of the variance as far as alarms do not coincide.
+/// Rates add: 1/(4 interval) + 1/(4 interval) + 1/(2 interval) = 1/interval. So they do for the two charts of the mean
+/// (Kemp, The average run length of the cumulative sum chart when a V-mask is used, J. R. Statist. Soc. B 23, 1961);
+/// with the chart of the variance as far as alarms do not coincide.
 ///
-/// With several outputs the chart of the variance is alone, and its L is the interval: its steps are those of chi-square with
-/// as many degrees of freedom as `outputs`. Where some are missing at times it gives alarms about as often: with three
-/// outputs, each missing in a fifth of the samples, 0.84 times (measured).
+/// With several outputs the chart of the variance is alone, and its L is the interval: its steps are those of
+/// chi-square with as many degrees of freedom as `outputs`. Where some are missing at times it gives alarms about as
+/// often: with three outputs, each missing in a fifth of the samples, 0.84 times (measured).
 ///
 /// For the charts see [`ChangeDetector`]. The thresholds solve Page's integral equation (1954) to 0.1 % of the interval
 /// up to 1e6, and to 1 % at 1e9.
 ///
-/// Cost: some 20 run lengths for each of the two thresholds, each of two Toeplitz systems, of 121 and of 241 rows: some 3e7
-/// multiply-adds in all, once for a detector.
+/// Cost: some 20 run lengths for each of the two thresholds, each of two Toeplitz systems, of 121 and of 241 rows: some
+/// 3e7 multiply-adds in all, once for a detector.
 ///
-/// How real alarms differ: charts that see the same innovations give an alarm together at times, which makes false ones a
-/// little rarer than asked. An estimator with a short memory takes its innovations for a little less sure than they are: with
-/// 4 parameters and a factor of 0.99 they came 0.5 to 0.7 times as often, with 0.999 or without forgetting 0.9 to 1.1 times
-/// (measured). Outliers and heavy tails give more, mostly on the chart of the variance.
+/// How real alarms differ: charts that see the same innovations give an alarm together at times, which makes false ones
+/// a little rarer than asked. An estimator with a short memory takes its innovations for a little less sure than they
+/// are: with 4 parameters and a factor of 0.99 they came 0.5 to 0.7 times as often, with 0.999 or without forgetting
+/// 0.9 to 1.1 times (measured). Outliers and heavy tails give more, mostly on the chart of the variance.
 ///
 /// # Errors
 /// [`Error::Argument`] if the interval is not in 10 … 1e9, or there are not 1 to 1000 outputs.
@@ -95,8 +96,8 @@ fn mean(w: f64) -> Steps {
     Steps { distribution, integral: x * distribution + density(x) }
 }
 
-/// The steps of the chart of the variance, (s/2 - m ln 2)/2: with F_m the distribution function of chi-square with m degrees
-/// of freedom,
+/// The steps of the chart of the variance, (s/2 - m ln 2)/2: with F_m the distribution function of chi-square with m
+/// degrees of freedom,
 ///
 /// ```text
 /// s = 4 w + 2 m ln 2,     4 G = s F_m(s) - m F_(m+2)(s)
@@ -120,8 +121,8 @@ fn density(x: f64) -> f64 {
 /// The threshold h with the average run length that is asked for: by regula falsi, in its Illinois form, on ln L, which
 /// is nearly a line.
 ///
-/// The steps are log-likelihood ratios, so that L >= exp(h) (Lorden, Procedures for reacting to a change in distribution,
-/// 1971): h lies between 0 and ln L.
+/// The steps are log-likelihood ratios, so that L >= exp(h) (Lorden, Procedures for reacting to a change in
+/// distribution, 1971): h lies between 0 and ln L.
 fn threshold(interval: f64, steps: impl Fn(f64) -> Steps + Copy) -> f64 {
     let excess = |h: f64| (average_run_length(h, steps) / interval).ln();
     let (mut low, mut high) = (0.0, interval.ln());
@@ -155,14 +156,15 @@ fn average_run_length(threshold: f64, steps: impl Fn(f64) -> Steps + Copy) -> f6
     fine + (fine - coarse) / 3.0
 }
 
-/// L for a start at 0 by collocation at m + 1 points: L = 1 + P L, where all columns of P but the first and the last are those
-/// of a Toeplitz matrix T,
+/// L for a start at 0 by collocation at m + 1 points: L = 1 + P L, where all columns of P but the first and the last
+/// are those of a Toeplitz matrix T,
 ///
 /// ```text
 /// P L = T L + p L(0) + q L(h)
 /// ```
 ///
-/// With (I - T) (a, b, c) = (1, p, q) that is L = a + b L(0) + c L(h), of which the first and the last row have two unknowns.
+/// With (I - T) (a, b, c) = (1, p, q) that is L = a + b L(0) + c L(h), of which the first and the last row have two
+/// unknowns.
 fn on_points(segments: usize, threshold: f64, steps: impl Fn(f64) -> Steps) -> f64 {
     let width = threshold / segments as f64;
     let points = segments + 1;
@@ -188,9 +190,9 @@ fn on_points(segments: usize, threshold: f64, steps: impl Fn(f64) -> Steps) -> f
     if length > 0.0 && length.is_finite() { length } else { f64::MAX }
 }
 
-/// The solutions of T x = b for three b at once, of n rows each, with the `entries` t(1-n) … t(n-1) of T_ij = t(j - i): in
-/// 11 n² multiply-adds (Levinson 1947; Golub and Van Loan, Matrix Computations, 4th ed. 2013, section 4.7). All leading
-/// blocks of T have to be well conditioned.
+/// The solutions of T x = b for three b at once, of n rows each, with the `entries` t(1-n) … t(n-1) of T_ij = t(j - i):
+/// in 11 n² multiply-adds (Levinson 1947; Golub and Van Loan, Matrix Computations, 4th ed. 2013, section 4.7). All
+/// leading blocks of T have to be well conditioned.
 fn toeplitz(entries: &[f64], right: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let rows = right.len();
     let diagonal = rows - 1;

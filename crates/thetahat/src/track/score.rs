@@ -3,11 +3,12 @@ use thetahat_core::Innovation;
 
 /// How well the samples were predicted one ahead, before each was used: the figures that policies are compared by.
 ///
-/// The first 2 n + 20 samples that were predicted do not count, n being the number of parameters, unless the tracker started
-/// from a report: while nothing is known, errors are as large as the output, and would hide those of all later samples.
+/// The first 2 n + 20 samples that were predicted do not count, n being the number of parameters, unless the tracker
+/// started from a report: while nothing is known, errors are as large as the output, and would hide those of all later
+/// samples.
 ///
-/// The figures are running means, so that they neither overflow nor lose digits, however many samples there are (Welford, Note
-/// on a method for calculating corrected sums of squares and products, Technometrics 4, 1962).
+/// The figures are running means, so that they neither overflow nor lose digits, however many samples there are
+/// (Welford, Note on a method for calculating corrected sums of squares and products, Technometrics 4, 1962).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TrackScore {
     samples: u64,

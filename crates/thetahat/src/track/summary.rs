@@ -60,7 +60,8 @@ pub struct TrackerSummary {
 }
 
 impl Tracker {
-    /// What it has come to. How many alarms it gave, and what its output is called, is known to who counted and named them.
+    /// What it has come to. How many alarms it gave, and what its output is called, is known to who counted and named
+    /// them.
     pub fn summary(&self, alarms: u64) -> TrackerSummary {
         let coupled = self.coupled_outputs();
         let all =

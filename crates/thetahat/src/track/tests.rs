@@ -17,7 +17,8 @@ use crate::data::Record;
 use crate::estimate::{Initial, arx};
 use crate::model::Orders;
 
-/// A log of y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u1(t-1) + 0.5 u1(t-2) - u2(t) + e(t) + c e(t-1), with e uniform in -size … size.
+/// A log of y(t) = 1.5 y(t-1) - 0.7 y(t-2) + 2 u1(t-1) + 0.5 u1(t-2) - u2(t) + e(t) + c e(t-1), with e uniform in -size
+/// … size.
 pub(super) fn log(rows: usize, size: f64, c: f64, seed: u64) -> (Vec<[f64; 2]>, Vec<f64>) {
     let mut noise = Noise(seed);
     let inputs: Vec<[f64; 2]> = (0..rows).map(|_| [3.0 * noise.uniform(), noise.uniform()]).collect();
@@ -162,7 +163,8 @@ fn without_forgetting_it_ends_at_the_batch_fit() {
         assert!((found / row.1[row.0].sqrt() - 1.0).abs() < 1e-6);
     }
 
-    // The prior of the standard start pulls at them by (Phi'Phi + S)^-1 S theta, S_jj = scale_j^2/100: nearly P S theta.
+    // The prior of the standard start pulls at them by (Phi'Phi + S)^-1 S theta, S_jj = scale_j^2/100: nearly P S
+    // theta.
     let mut standard = Tracker::new(&orders(), &TrackPlan { start: TrackStart::default(), ..exact }).unwrap();
     run(&mut standard, &inputs, &y);
     let scales = standard.scales().unwrap();

@@ -19,9 +19,9 @@ const FARTHEST: usize = 10_000;
 /// What a tracker made of one sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tracked {
-    /// The one-step prediction, from all samples before and the inputs of this one, in the output's units; NaN if there is
-    /// none: while rows are collected, and where it depends on a missing sample. (It is there where only the output is
-    /// missing.)
+    /// The one-step prediction, from all samples before and the inputs of this one, in the output's units; NaN if there
+    /// is none: while rows are collected, and where it depends on a missing sample. (It is there where only the output
+    /// is missing.)
     pub predicted: f64,
     /// The innovation e: the output less its prediction; NaN if one of the two is missing.
     pub error: f64,
@@ -31,14 +31,16 @@ pub struct Tracked {
     pub nis: f64,
     /// What was done with the sample.
     pub action: Action,
-    /// How much is known of the parameter that least is known of, 0 … 1; 0 while scales are collected. Below 0.5 or so, do
-    /// not rely on the parameters. See [`RecursiveLeastSquares::excitation`](thetahat_core::RecursiveLeastSquares::excitation).
+    /// How much is known of the parameter that least is known of, 0 … 1; 0 while scales are collected. Below 0.5 or so,
+    /// do not rely on the parameters. See
+    /// [`RecursiveLeastSquares::excitation`](thetahat_core::RecursiveLeastSquares::excitation).
     pub excitation: f64,
-    /// A change that was noticed, if that was asked for. The charts begin after 2 n + 20 innovations, n being the number of
-    /// parameters: a noise variance from fewer would call many a sample unlikely. After a report they begin at once.
+    /// A change that was noticed, if that was asked for. The charts begin after 2 n + 20 innovations, n being the
+    /// number of parameters: a noise variance from fewer would call many a sample unlikely. After a report they begin
+    /// at once.
     pub alarm: Option<Alarm<f64>>,
-    /// Whether a value was so large that sums with it could overflow (beyond about 1e148, or 1e98 while scales are collected):
-    /// it was taken for missing.
+    /// Whether a value was so large that sums with it could overflow (beyond about 1e148, or 1e98 while scales are
+    /// collected): it was taken for missing.
     pub too_large: bool,
 }
 
@@ -49,9 +51,10 @@ pub struct Tracked {
 /// ```
 ///
 /// It is a [`RecursiveArx`](thetahat_core::RecursiveArx), a [`RecursiveArmax`](thetahat_core::RecursiveArmax) or a
-/// [`RecursiveNarx`](thetahat_core::RecursiveNarx), where the equations and the sources are, with what a program needs that gets its orders from a person: channels with offsets,
-/// scales that are found, predictions, figures, detection of changes, and a start from the report of a fit. NaN is a
-/// missing sample. Parameters are those of the signals less their offsets.
+/// [`RecursiveNarx`](thetahat_core::RecursiveNarx), where the equations and the sources are, with what a program needs
+/// that gets its orders from a person: channels with offsets, scales that are found, predictions, figures, detection of
+/// changes, and a start from the report of a fit. NaN is a missing sample. Parameters are those of the signals less
+/// their offsets.
 ///
 /// # Several outputs
 ///
@@ -59,28 +62,29 @@ pub struct Tracked {
 /// A(q) y(k) = sum_j B_j(q) u_j(k) + constant + e(k),   A(q) = I + A_1 q⁻¹ + … + A_na q⁻ⁿᵃ with full matrices
 /// ```
 ///
-/// is an equation for each output: [`Tracker::coupled`] is one of them, a tracker with the past of all outputs in its regressor, and
-/// [`Tracker::log_row_of`] and [`forecasts`](crate::track::forecasts) are for as many of them side by side. Each has a memory, a noise variance, a
-/// detector and a dead zone of its own, and goes on learning where another output is missing, as long as no such sample is in its
-/// regressor. ([`RecursiveVectorArx`](thetahat_core::RecursiveVectorArx) is all of them in one with a common P: for a controller, where no
-/// output is ever missing alone.)
+/// is an equation for each output: [`Tracker::coupled`] is one of them, a tracker with the past of all outputs in its
+/// regressor, and [`Tracker::log_row_of`] and [`forecasts`](crate::track::forecasts) are for as many of them side by
+/// side. Each has a memory, a noise variance, a detector and a dead zone of its own, and goes on learning where another
+/// output is missing, as long as no such sample is in its regressor.
+/// ([`RecursiveVectorArx`](thetahat_core::RecursiveVectorArx) is all of them in one with a common P: for a controller,
+/// where no output is ever missing alone.)
 ///
 /// # Scales
 ///
 /// The estimator needs the typical magnitude of each channel, for its prior and its bounds. If the plan does not have
-/// them, the tracker keeps the latest L rows, L being the maximum lag of the orders plus two rows for each parameter and
-/// at least 10, until there are L and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
-/// long the action is [`Action::Collecting`]. Then the scales are the largest magnitudes that were seen, the rows that were kept
-/// go into the estimator, and from the next row on all is, to the bit, as if the scales had been given and it had started
-/// with the first of these rows.
+/// them, the tracker keeps the latest L rows, L being the maximum lag of the orders plus two rows for each parameter
+/// and at least 10, until there are L and every channel has shown a value other than 0 (below 1e-98 counts as 0). So
+/// long the action is [`Action::Collecting`]. Then the scales are the largest magnitudes that were seen, the rows that
+/// were kept go into the estimator, and from the next row on all is, to the bit, as if the scales had been given and it
+/// had started with the first of these rows.
 ///
 /// # Cost
 ///
-/// For n parameters 2 n² + 10 n multiply-adds, 2 n divisions and one logarithm a sample. Once the scales are known a sample
-/// takes no memory, and nothing grows with their number.
+/// For n parameters 2 n² + 10 n multiply-adds, 2 n divisions and one logarithm a sample. Once the scales are known a
+/// sample takes no memory, and nothing grows with their number.
 ///
-/// A tracker is plain data. With serde it is written and read back, and goes on to the bit; what does not fit together is an
-/// error.
+/// A tracker is plain data. With serde it is written and read back, and goes on to the bit; what does not fit together
+/// is an error.
 ///
 /// ```
 /// use thetahat::model::Orders;
@@ -121,7 +125,8 @@ pub struct Tracker {
     pub(super) settling: usize,
     detector: Option<ChangeDetector<f64>>,
     score: TrackScore,
-    /// The latest inputs as the estimator sees them: less their offsets, and after what the outputs in the equation were a row before.
+    /// The latest inputs as the estimator sees them: less their offsets, and after what the outputs in the equation
+    /// were a row before.
     pub(super) inputs: Vec<f64>,
     /// The latest of these outputs, less their offsets and with the sign of A.
     pub(super) past: Vec<f64>,
@@ -148,10 +153,10 @@ impl Tracker {
     /// A tracker that knows nothing yet. The orders are those of AR, ARX, ARMA or ARMAX.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the orders have D or F, or C with the method `rls`, or the other two methods without C; if ARMA or
-    /// ARMAX is to start otherwise than `standard`; if there is not one offset or scale for each channel; if a factor is not above
-    /// n/(n + 1) for n parameters (the constant is one of them); if a scale is not in 1e-98 … 1e98; if another number of the
-    /// plan is out of its range.
+    /// [`Error::Argument`] if the orders have D or F, or C with the method `rls`, or the other two methods without C;
+    /// if ARMA or ARMAX is to start otherwise than `standard`; if there is not one offset or scale for each channel; if
+    /// a factor is not above n/(n + 1) for n parameters (the constant is one of them); if a scale is not in 1e-98 …
+    /// 1e98; if another number of the plan is out of its range.
     pub fn new(orders: &Orders, plan: &TrackPlan) -> Result<Self, Error> {
         Self::of(orders, 0, None, plan)
     }
@@ -159,9 +164,9 @@ impl Tracker {
     /// A tracker of one of several outputs, whose equation has the past of all of them: na samples of each. See
     /// [Several outputs](Tracker#several-outputs).
     ///
-    /// The numbers of the plan for the inputs are those of the outputs, in their order, then those of the inputs; that for the output
-    /// is that of the tracker's own. Parameters are a1_1, a1_2, … of the first output, a2_1, … of the next, then those of the
-    /// inputs.
+    /// The numbers of the plan for the inputs are those of the outputs, in their order, then those of the inputs; that
+    /// for the output is that of the tracker's own. Parameters are a1_1, a1_2, … of the first output, a2_1, … of the
+    /// next, then those of the inputs.
     ///
     /// # Errors
     /// As [`Tracker::new`]; [`Error::Argument`] for fewer than two outputs, and for orders with C.
@@ -209,12 +214,13 @@ impl Tracker {
     /// y(k) = s g(z(k)) + e(k),   g(z) = sum_j theta_j f_j(z)
     /// ```
     ///
-    /// where z are lags, na of the output and nb of each input from nk on, as deviations over the scale of their channel, and s is the
-    /// scale of the output. Least squares from the prior, on functions instead of lags. `regressors` name the lags.
+    /// where z are lags, na of the output and nb of each input from nk on, as deviations over the scale of their
+    /// channel, and s is the scale of the output. Least squares from the prior, on functions instead of lags.
+    /// `regressors` name the lags.
     ///
     /// # Errors
-    /// As [`Tracker::new`]; [`Error::Argument`] if the map is not of that many lags, if it has more than 1000 functions, and for a
-    /// constant, which is one of its functions.
+    /// As [`Tracker::new`]; [`Error::Argument`] if the map is not of that many lags, if it has more than 1000
+    /// functions, and for a constant, which is one of its functions.
     pub fn nonlinear(
         orders: &Orders,
         map: &Map,
@@ -283,13 +289,13 @@ impl Tracker {
         })
     }
 
-    /// One row of a log: the output y(k) and the inputs u(k) in the order of the orders, recorded at the same instant, in
-    /// their own units. NaN is a missing sample. A finite value that is too large for the arithmetic is taken for missing, and
-    /// [`Tracked::too_large`] says so.
+    /// One row of a log: the output y(k) and the inputs u(k) in the order of the orders, recorded at the same instant,
+    /// in their own units. NaN is a missing sample. A finite value that is too large for the arithmetic is taken for
+    /// missing, and [`Tracked::too_large`] says so.
     ///
     /// # Errors
-    /// After which nothing has changed: [`Error::Argument`] if there is not one value for each input; [`Error::Data`] if one
-    /// is infinite.
+    /// After which nothing has changed: [`Error::Argument`] if there is not one value for each input; [`Error::Data`]
+    /// if one is infinite.
     pub fn log_row(&mut self, output: f64, inputs: &[f64]) -> Result<Tracked, Error> {
         if self.outputs > 0 {
             let message = format!("there is one value for {} outputs; give those of all", self.outputs);
@@ -298,11 +304,12 @@ impl Tracker {
         self.log_row_of(0, &[output], inputs)
     }
 
-    /// One row of a log with several outputs, of which this tracker is that of the one in this place, counted from 0. See
-    /// [`Tracker::log_row`].
+    /// One row of a log with several outputs, of which this tracker is that of the one in this place, counted from 0.
+    /// See [`Tracker::log_row`].
     ///
     /// # Errors
-    /// Those of `log_row`; [`Error::Argument`] if the outputs are not those of [`Tracker::coupled`], or there is none in this place.
+    /// Those of `log_row`; [`Error::Argument`] if the outputs are not those of [`Tracker::coupled`], or there is none
+    /// in this place.
     pub fn log_row_of(&mut self, place: usize, outputs: &[f64], inputs: &[f64]) -> Result<Tracked, Error> {
         if inputs.len() != self.orders.inputs() {
             let message = format!("there are {} values for {} inputs", inputs.len(), self.orders.inputs());
@@ -427,14 +434,16 @@ impl Tracker {
         self.past.fill(f64::NAN);
     }
 
-    /// The prediction this many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to come are
-    /// held at their latest values.
+    /// The prediction this many steps ahead: y(k + steps) from the samples up to k, in the output's units. Inputs to
+    /// come are held at their latest values.
     ///
     /// NaN if there is none: before there is an estimate, where it depends on a missing sample, or where an unstable
-    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with this many steps.)
+    /// model overflows. 2 n multiply-adds and moves a step. (The memory for it is taken at the first call with this
+    /// many steps.)
     ///
     /// # Errors
-    /// [`Error::Argument`] if the steps are not in 1 … 10,000; for one of several outputs, which [`forecasts`](crate::track::forecasts) is for.
+    /// [`Error::Argument`] if the steps are not in 1 … 10,000; for one of several outputs, which
+    /// [`forecasts`](crate::track::forecasts) is for.
     pub fn forecast(&mut self, steps: usize) -> Result<f64, Error> {
         check_steps(steps)?;
         if self.outputs > 0 {
@@ -454,8 +463,8 @@ impl Tracker {
         Ok(outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output))
     }
 
-    /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if there is one; of a
-    /// nonlinear model its functions.
+    /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if
+    /// there is one; of a nonlinear model its functions.
     pub fn names(&self) -> &[String] {
         &self.names
     }
@@ -584,8 +593,8 @@ impl Tracker {
         }
     }
 
-    /// The plan that the tracker was made with; after a report with the offsets, scales and noise scale that follow from it,
-    /// where they were left open.
+    /// The plan that the tracker was made with; after a report with the offsets, scales and noise scale that follow
+    /// from it, where they were left open.
     pub fn plan(&self) -> &TrackPlan {
         &self.plan
     }

@@ -18,17 +18,19 @@ use crate::report::Report;
 const PRIOR: f64 = 100.0;
 
 impl Tracker {
-    /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA, ARMAX or nonlinear ARX: its parameters, its covariance
-    /// divided by its noise variance as P, its noise variance and number of samples, its offsets.
+    /// A tracker that starts from what a fit found, a report of AR, ARX, ARMA, ARMAX or nonlinear ARX: its parameters,
+    /// its covariance divided by its noise variance as P, its noise variance and number of samples, its offsets.
     ///
-    /// The orders are those of the report; of a nonlinear model the functions and scales too. Scales that the plan does not have
-    /// follow from P: the regressor of parameter j has the magnitude 1/sqrt(N P_jj) at least, N being the number of samples,
-    /// and a channel the largest of its parameters'. So there are no rows to collect. The noise scale is the square root of
-    /// the noise variance. A constant is not in the report: it starts from 0, and is as free as without a report.
+    /// The orders are those of the report; of a nonlinear model the functions and scales too. Scales that the plan does
+    /// not have follow from P: the regressor of parameter j has the magnitude 1/sqrt(N P_jj) at least, N being the
+    /// number of samples, and a channel the largest of its parameters'. So there are no rows to collect. The noise
+    /// scale is the square root of the noise variance. A constant is not in the report: it starts from 0, and is as
+    /// free as without a report.
     ///
     /// # Errors
-    /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise variance of 0, or an offset that is a line in time; [`Error::Argument`] if the
-    /// plan asks for another start than `standard`.
+    /// As [`Tracker::new`]; [`Error::Report`] if the report is of another structure; if it has no covariance or a noise
+    /// variance of 0, or an offset that is a line in time; [`Error::Argument`] if the plan asks for another start than
+    /// `standard`.
     pub fn from_report(report: &Report, plan: &TrackPlan) -> Result<Self, Error> {
         check_start(plan)?;
         if let Some(model) = report.model.as_nonlinear_arx() {

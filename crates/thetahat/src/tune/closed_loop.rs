@@ -1,7 +1,7 @@
 //! What a loop does.
 //!
-//! The process moves exactly between the steps of a fine clock of which the dead time is a whole number; the controller acts at each.
-//! The derivative acts on the measured output, filtered by 1/(1 + Td s/10).
+//! The process moves exactly between the steps of a fine clock of which the dead time is a whole number; the controller
+//! acts at each. The derivative acts on the measured output, filtered by 1/(1 + Td s/10).
 
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -172,7 +172,8 @@ impl Simulation {
         let times = [closed_loop_time, theta, ti, 2.0 * filter];
         let short = times.into_iter().filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
         let wanted = (short / FINE).max(length / MOST_STEPS);
-        // The dead time is a whole number of steps, none if it is less than half of one: it must not make them shorter and shorter.
+        // The dead time is a whole number of steps, none if it is less than half of one: it must not make them shorter
+        // and shorter.
         let delay = if theta < 0.5 * wanted { 0.0 } else { (theta / wanted).ceil() };
         let step = if delay > 0.0 { theta / delay } else { wanted };
         let chain = structure.chain(&parts.shape);

@@ -63,10 +63,11 @@ pub struct ReducedProcess {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Rule {
-    /// Skogestad's rules (J. Process Control 13 (2003)): the loop follows like 1/(1 + tau_c s) e^(-theta s), and Ti is no longer than
-    /// 4 (tau_c + theta), so that loads are taken away soon.
+    /// Skogestad's rules (J. Process Control 13 (2003)): the loop follows like 1/(1 + tau_c s) e^(-theta s), and Ti is
+    /// no longer than 4 (tau_c + theta), so that loads are taken away soon.
     Simc,
-    /// Lambda tuning (Dahlin 1968; Åström and Hägglund, Advanced PID Control, 2006, section 6.5): the same with Ti = tau1.
+    /// Lambda tuning (Dahlin 1968; Åström and Hägglund, Advanced PID Control, 2006, section 6.5): the same with Ti =
+    /// tau1.
     Lambda,
 }
 
@@ -99,8 +100,9 @@ pub struct ClosedLoop {
     pub phase_margin: Option<f64>,
     /// The integral of the absolute error after a step of 1 at the input of the process; none of an unstable loop.
     pub load_absolute_error: Option<f64>,
-    /// The largest Ms where each parameter, and the directions in which they are least certain together, lie at the ends of their 95 %
-    /// intervals; none where no standard errors are known, and where the loop is not stable at one of these ends.
+    /// The largest Ms where each parameter, and the directions in which they are least certain together, lie at the
+    /// ends of their 95 % intervals; none where no standard errors are known, and where the loop is not stable at one
+    /// of these ends.
     pub worst_peak_sensitivity: Option<f64>,
     /// Seconds, of the responses.
     pub time: Vec<f64>,

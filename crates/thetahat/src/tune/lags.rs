@@ -21,8 +21,8 @@ pub(super) fn lags(structure: &ProcessStructure, values: &[f64]) -> Lags {
 }
 
 impl Lags {
-    /// The half rule: with so many lags left, half of the first that is left out goes to the one before it, half to the dead time, and so
-    /// do all further ones.
+    /// The half rule: with so many lags left, half of the first that is left out goes to the one before it, half to the
+    /// dead time, and so do all further ones.
     pub(super) fn reduced(&self, kept: usize) -> Lags {
         let mut taus: Vec<f64> = self.taus.iter().copied().take(kept).collect();
         let mut dead_time = self.dead_time;

@@ -19,7 +19,8 @@ const FAST: f64 = 1.0 / 3.0;
 pub struct TuningPlan {
     /// The input that the controller moves; none: the only one.
     pub input: Option<String>,
-    /// The time constant that the loop shall have, in seconds; none: theta by SIMC, the larger of tau and theta by lambda tuning.
+    /// The time constant that the loop shall have, in seconds; none: theta by SIMC, the larger of tau and theta by
+    /// lambda tuning.
     pub closed_loop_time: Option<f64>,
     /// The controller; none: both.
     pub controller: Option<Controller>,
@@ -36,12 +37,13 @@ pub struct TuningPlan {
 ///
 /// Lags that a rule has no place for go to the dead time and to the lag before them by halves (Skogestad's half rule).
 ///
-/// Source: Skogestad, J. Process Control 13 (2003), sections 3 and 5; Dahlin 1968; Åström and Hägglund, Advanced PID Control, 2006,
-/// section 6.5; Chien and Fruehauf 1990 for integrating processes.
+/// Source: Skogestad, J. Process Control 13 (2003), sections 3 and 5; Dahlin 1968; Åström and Hägglund, Advanced PID
+/// Control, 2006, section 6.5; Chien and Fruehauf 1990 for integrating processes.
 ///
 /// # Errors
-/// [`Error::Argument`] for an input that is not there or not named where there are several, a closed-loop time that is not positive, and
-/// processes that the rules are not for: with a zero, a pair that is underdamped, lags side by side, or no gain.
+/// [`Error::Argument`] for an input that is not there or not named where there are several, a closed-loop time that is
+/// not positive, and processes that the rules are not for: with a zero, a pair that is underdamped, lags side by side,
+/// or no gain.
 ///
 /// ```
 /// use std::ops::ControlFlow;

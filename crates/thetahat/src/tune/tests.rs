@@ -32,8 +32,8 @@ fn near(found: f64, expected: f64, tolerance: f64) {
     assert!((found - expected).abs() <= tolerance, "{found} {expected}");
 }
 
-/// Skogestad 2003: with tau_c = theta and Ti = tau the loop is always the same, L = e^(-theta s)/(2 theta s): Ms 1.59, a gain margin
-/// of 3.14 and a phase margin of 61.4 degrees.
+/// Skogestad 2003: with tau_c = theta and Ti = tau the loop is always the same, L = e^(-theta s)/(2 theta s): Ms 1.59,
+/// a gain margin of 3.14 and a phase margin of 61.4 degrees.
 #[test]
 fn simc_settings_and_margins_are_the_published_ones() {
     let found = tune(&model("p1d", &[1.0, 10.0, 1.0]), &TuningPlan::default()).unwrap();

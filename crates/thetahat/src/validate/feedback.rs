@@ -1,30 +1,31 @@
 //! Whether an input follows the output.
 //!
-//! Noise that enters the output comes back to the input where there is feedback, and nowhere else. So, with the innovations e of
-//! the output, one test asks whether past innovations help to predict the input beyond its own past (Granger, Econometrica 37,
-//! 1969):
+//! Noise that enters the output comes back to the input where there is feedback, and nowhere else. So, with the
+//! innovations e of the output, one test asks whether past innovations help to predict the input beyond its own past
+//! (Granger, Econometrica 37, 1969):
 //!
 //! ```text
 //! u(t) = sum_{i=1..p} c_i u(t - i) + w(t),   psi(w(t)) = sum_{k=1..5} d_k z_k(t) + r(t),   H0: d = 0
 //! W = d' G M^-1 G d  ~  chi-square(5),   G = sum z z',   M = N/(N - p - 5) sum r^2 z z'
 //! ```
 //!
-//! z_k is what the past of u leaves of e(t - k). Innovations rather than outputs: past outputs hold past inputs too, and would
-//! help a model of the input that is too short.
+//! z_k is what the past of u leaves of e(t - k). Innovations rather than outputs: past outputs hold past inputs too,
+//! and would help a model of the input that is too short.
 //!
-//! - Set-points move in steps: a few w are large and hide what all others show. psi bounds w at two standard deviations (Huber,
-//!   Robust Statistics, 1981, section 7.8), and c is that of these bounded residuals, found with his pseudo-values.
-//!   An input that is held most of the time has no such scale, and keeps its w.
-//! - The spread of r changes with u where the plant is not linear, or u is held: M is that of White (Econometrica 48, 1980).
+//! - Set-points move in steps: a few w are large and hide what all others show. psi bounds w at two standard deviations
+//!   (Huber, Robust Statistics, 1981, section 7.8), and c is that of these bounded residuals, found with his
+//!   pseudo-values. An input that is held most of the time has no such scale, and keeps its w.
+//! - The spread of r changes with u where the plant is not linear, or u is held: M is that of White (Econometrica 48,
+//!   1980).
 //! - A plant that is not linear leaves a function of past inputs in e, which may tell a little of an input that is not
-//!   Gaussian, and in a long log any little is significant. So d of four fifths of the rows has to predict the fifth that was
-//!   left out: `explained` is the fraction of the squares of psi(w) that this takes away, over all five, and feedback is
-//!   suspected from 0.5 % on only.
+//!   Gaussian, and in a long log any little is significant. So d of four fifths of the rows has to predict the fifth
+//!   that was left out: `explained` is the fraction of the squares of psi(w) that this takes away, over all five, and
+//!   feedback is suspected from 0.5 % on only.
 //!
-//! The effect of e(t) on u(t) itself is left out: it looks like an output that answers the input at once. A controller that sees
-//! the output of the same row is found by what follows, which is weaker. An input that its own past determines or that
-//! repeats itself, and data without noise, tell nothing of it. Nor does a controller that has little noise to answer: then an unstable
-//! plant tells, which would not stay where it is without one ([`unstable_pole`]).
+//! The effect of e(t) on u(t) itself is left out: it looks like an output that answers the input at once. A controller
+//! that sees the output of the same row is found by what follows, which is weaker. An input that its own past
+//! determines or that repeats itself, and data without noise, tell nothing of it. Nor does a controller that has little
+//! noise to answer: then an unstable plant tells, which would not stay where it is without one ([`unstable_pole`]).
 
 use std::ops::Range;
 
@@ -67,7 +68,8 @@ const CERTAIN_LEVEL: f64 = 1e-6;
 const CERTAIN_EXPLAINED: f64 = 0.02;
 /// An input that changes no more often is that of a step test, and follows whatever happens to come before its steps.
 const FEW_CHANGES: usize = 5;
-/// An input repeats itself if it does so to this fraction of its largest value; this many comparisons are made for each sample.
+/// An input repeats itself if it does so to this fraction of its largest value; this many comparisons are made for each
+/// sample.
 const REPEATED: f64 = 1e-6;
 const COMPARISONS: usize = 20;
 /// Residuals below this fraction of the output, or of the input, are rounding.
@@ -101,9 +103,11 @@ impl Feedback {
 /// What tells of a loop.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Loop {
-    /// What the innovations of the output tell of each input; none where they are rounding, or the data determine no model.
+    /// What the innovations of the output tell of each input; none where they are rounding, or the data determine no
+    /// model.
     pub(crate) inputs: Vec<Option<Feedback>>,
-    /// The modulus of the plant's largest pole and its standard error, where it is outside of the unit circle for certain.
+    /// The modulus of the plant's largest pole and its standard error, where it is outside of the unit circle for
+    /// certain.
     unstable_pole: Option<[f64; 2]>,
 }
 
@@ -122,7 +126,8 @@ impl Loop {
     }
 }
 
-/// What an ARX model of order 10 on all inputs, lag 0 included, tells of a loop: its innovations and its poles. O(N p^2).
+/// What an ARX model of order 10 on all inputs, lag 0 included, tells of a loop: its innovations and its poles. O(N
+/// p^2).
 pub(crate) fn feedback<S: AsRef<[f64]>>(inputs: &[S], output: &[f64], segments: &[Range<usize>]) -> Loop {
     let output = centred(output, segments);
     let inputs: Vec<Vec<f64>> = inputs.iter().map(|input| centred(input.as_ref(), segments)).collect();
@@ -152,8 +157,8 @@ fn centred(signal: &[f64], segments: &[Range<usize>]) -> Vec<f64> {
     centred
 }
 
-/// The modulus of the largest pole of an ARX model, and its standard error, where it is more than [`CERTAIN`] of them outside of the
-/// unit circle. None else, and where its standard error is not known.
+/// The modulus of the largest pole of an ARX model, and its standard error, where it is more than [`CERTAIN`] of them
+/// outside of the unit circle. None else, and where its standard error is not known.
 fn unstable_pole(order: usize, solved: &Regression) -> Option<[f64; 2]> {
     let own = solved.covariance.view((0, 0), (order, order));
     let covariance: Vec<Vec<f64>> = own.row_iter().map(|row| row.iter().copied().collect()).collect();
@@ -219,8 +224,8 @@ fn repeats(input: &[f64], segments: &[Range<usize>]) -> bool {
     false
 }
 
-/// The same beyond this many past values of the input: none if they depend on one another, or are too many, and nothing if they
-/// determine it.
+/// The same beyond this many past values of the input: none if they depend on one another, or are too many, and nothing
+/// if they determine it.
 fn beyond(
     own: usize,
     input: &[f64],

@@ -22,8 +22,9 @@ pub enum Part {
 
 /// How close a model comes to measured outputs.
 ///
-/// With e = y - y^: percent = 100 (1 - |e| / |y - mean(y)|), rmse = |e| / sqrt(N), |.| being the root of the sum of squares,
-/// and the mean and the largest of the absolute errors |e(t)|, all over the N samples that the response covers.
+/// With e = y - y^: percent = 100 (1 - |e| / |y - mean(y)|), rmse = |e| / sqrt(N), |.| being the root of the sum of
+/// squares, and the mean and the largest of the absolute errors |e(t)|, all over the N samples that the response
+/// covers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Fit {
     /// The output.
@@ -39,8 +40,8 @@ pub struct Fit {
     pub initial: InitialCondition,
     /// N: samples without a start, or in a gap, do not count.
     pub samples: usize,
-    /// 100 is perfect, 0 is as good as the mean; none where it is not defined: no samples, a constant output, a response
-    /// that overflows.
+    /// 100 is perfect, 0 is as good as the mean; none where it is not defined: no samples, a constant output, a
+    /// response that overflows.
     pub percent: Option<f64>,
     /// Root mean square error in units of y; none where there are no samples or the response overflows.
     pub rmse: Option<f64>,
@@ -50,7 +51,8 @@ pub struct Fit {
     /// The largest |e(t)| in units of y; none likewise.
     #[serde(default)]
     pub largest_error: Option<f64>,
-    /// Of a nonlinear model the share of these samples for which it read values outside of those that it was fitted to, 0 … 1.
+    /// Of a nonlinear model the share of these samples for which it read values outside of those that it was fitted to,
+    /// 0 … 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub outside: Option<f64>,
 }

@@ -6,24 +6,25 @@
 //! P_ij = sum_k R_e(k) R_u(k + i - j)
 //! ```
 //!
-//! (Ljung, System Identification, 2nd ed. 1999, section 16.6), and N s' P^-1 s is chi-square with M degrees of freedom. P
-//! comes from e = w/A(q), w white of variance sigma^2 and the order of A chosen by MDL: sum u(t - k) e(t) = sum zeta_k(t) w(t)
-//! with zeta_k = u(t - k)/A(q^+1), and P = sigma^2 sum zeta zeta'/N, for the input as it was and whatever the colour of e.
+//! (Ljung, System Identification, 2nd ed. 1999, section 16.6), and N s' P^-1 s is chi-square with M degrees of freedom.
+//! P comes from e = w/A(q), w white of variance sigma^2 and the order of A chosen by MDL: sum u(t - k) e(t) = sum
+//! zeta_k(t) w(t) with zeta_k = u(t - k)/A(q^+1), and P = sigma^2 sum zeta zeta'/N, for the input as it was and
+//! whatever the colour of e.
 //!
-//! That holds for a model that is known. On the samples of the fit, s is what is left by the estimate: with psi taken off the
-//! lagged inputs,
+//! That holds for a model that is known. On the samples of the fit, s is what is left by the estimate: with psi taken
+//! off the lagged inputs,
 //!
 //! ```text
 //! z_k(t) = u(t - k) - K_k psi(t),   K = (sum u psi')(sum psi psi')^-1,
 //! ```
 //!
-//! sum z_k e does not change to first order with the parameters, and zeta is made of z. Directions of which psi leaves less
-//! than 0.05 are left out: about one for each parameter of the plant. On other samples the parameters' errors come on top: N
-//! (sum u psi'/N) cov (sum u psi'/N)'. An input that is not rich has a P of less than full rank: as many directions count, two
-//! for a sinusoid.
+//! sum z_k e does not change to first order with the parameters, and zeta is made of z. Directions of which psi leaves
+//! less than 0.05 are left out: about one for each parameter of the plant. On other samples the parameters' errors come
+//! on top: N (sum u psi'/N) cov (sum u psi'/N)'. An input that is not rich has a P of less than full rank: as many
+//! directions count, two for a sinusoid.
 //!
-//! Future inputs, k < 0, depend on e where there is feedback; each of M lags has M times the chance. They do so too where the model
-//! lacks dynamics and the input predicts itself: what speaks for feedback alone is in `feedback`.
+//! Future inputs, k < 0, depend on e where there is feedback; each of M lags has M times the chance. They do so too
+//! where the model lacks dynamics and the input predicts itself: what speaks for feedback alone is in `feedback`.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::distribution::{chi_square_tail, two_sided};
@@ -35,8 +36,8 @@ use super::verdict::{Independence, Test};
 use super::whiteness::chi_square;
 use crate::estimate::{Autoregression, backward_filtered_products};
 
-/// Directions in which an input has less than the energy of this many of its samples are left out: a sum of few errors is not
-/// normal, and where an input is not rich they are no more than its ends.
+/// Directions in which an input has less than the energy of this many of its samples are left out: a sum of few errors
+/// is not normal, and where an input is not rich they are no more than its ends.
 const RICH: f64 = 10.0;
 
 /// What the tests of all inputs share.

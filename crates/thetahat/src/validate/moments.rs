@@ -1,8 +1,8 @@
 //! The signals that tests of residuals are made of, and the sums of their products.
 //!
-//! These are e, the inputs, and psi as the model has it (`respond::regressors`). Each signal is measured from its mean over the samples
-//! that count: an offset of the log is no matter of dynamics. Every sum runs over these samples of every segment; what stands before a
-//! segment is zero.
+//! These are e, the inputs, and psi as the model has it (`respond::regressors`). Each signal is measured from its mean
+//! over the samples that count: an offset of the log is no matter of dynamics. Every sum runs over these samples of
+//! every segment; what stands before a segment is zero.
 
 use std::borrow::Cow;
 use std::ops::Range;

@@ -1,14 +1,14 @@
 //! Whether what is left of a model holds nonlinear terms of an input.
 //!
-//! Whiteness and independence are blind to them: with a symmetric input, u^2 correlates with no u, nor e with its own past. With
-//! v(t) = u(t)^2 less its mean and x = e, or e^2 less its mean, the statistic is
+//! Whiteness and independence are blind to them: with a symmetric input, u^2 correlates with no u, nor e with its own
+//! past. With v(t) = u(t)^2 less its mean and x = e, or e^2 less its mean, the statistic is
 //!
 //! ```text
 //! xi = r' V^-1 r/s^2,   r_k = sum_t v(t-k) x(t),   V_kl = sum_t v(t-k) v(t-l),   s^2 = sum_t x(t)^2/N,   k, l = 0 … 20
 //! ```
 //!
-//! which is chi-square with 21 degrees of freedom where x is white and knows nothing of u (Billings and Voon, Correlation based model
-//! validity tests for nonlinear models, Int. J. Control 44, 1986, as a portmanteau).
+//! which is chi-square with 21 degrees of freedom where x is white and knows nothing of u (Billings and Voon,
+//! Correlation based model validity tests for nonlinear models, Int. J. Control 44, 1986, as a portmanteau).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -16,12 +16,13 @@ use crate::respond::Innovations;
 /// Q = N^2 sum_{0 < h <= L} tr(C_h' C_0^-1 C_h C_0^-1)/N_h
 /// ```
 ///
-/// is chi-square with l^2 L degrees of freedom where they are white, N_h being how many pairs are h samples apart (Hosking, J. American
-/// Statistical Association 75, 1980), less `fitted` for as many parameters of the noise that were fitted to these samples. It sees what
-/// tests of single outputs do not: that one output's error is known from another's past.
+/// is chi-square with l^2 L degrees of freedom where they are white, N_h being how many pairs are h samples apart
+/// (Hosking, J. American Statistical Association 75, 1980), less `fitted` for as many parameters of the noise that were
+/// fitted to these samples. It sees what tests of single outputs do not: that one output's error is known from
+/// another's past.
 ///
-/// `outputs` has the innovations of each output, in the same segments; samples count in which all outputs were measured. None for fewer than
-/// two, segments of their own, or outputs of which nothing is left. O(N l^2 L).
+/// `outputs` has the innovations of each output, in the same segments; samples count in which all outputs were
+/// measured. None for fewer than two, segments of their own, or outputs of which nothing is left. O(N l^2 L).
 pub(crate) fn portmanteau(outputs: &[&[Innovations]], lags: usize, fitted: usize) -> Option<Test> {
     let (first, others) = outputs.split_first().filter(|(_, others)| !others.is_empty())?;
     let same = |other: &&[Innovations]| {

@@ -18,8 +18,8 @@ use crate::respond::{Regressors, Tested, TestedInput};
 const FEWEST: usize = 10;
 /// A lag has pairs for at least one in this many samples.
 const PAIRS: usize = 4;
-/// At least this many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's test
-/// rejects too often.
+/// At least this many samples stand for each lag of the autocorrelation, and of an input: with fewer, Ljung and Box's
+/// test rejects too often.
 const SAMPLES_PER_LAG: usize = 10;
 const SAMPLES_PER_INPUT_LAG: usize = 5;
 /// How many more lags of an input are tested than the plant has parameters.
@@ -93,7 +93,8 @@ impl fmt::Display for Untestable {
 }
 
 impl Residuals {
-    /// The tests of what a model leaves of an output: `lags` of the autocorrelation, Anderson's test at `alphas` with its verdicts at `level`.
+    /// The tests of what a model leaves of an output: `lags` of the autocorrelation, Anderson's test at `alphas` with
+    /// its verdicts at `level`.
     ///
     /// There are lags up to a tenth of the samples, of inputs to a fifth, and as far as a quarter of the samples have
     /// a partner. O(N (L + p)), and O(N (L + p)^2) where the residuals are coloured.

@@ -24,8 +24,8 @@ pub struct Anderson {
     pub lags: usize,
     /// One line for each alpha, in rising order.
     pub levels: Vec<AndersonLevel>,
-    /// The smallest alpha of a fine scale (0.001, 0.002, …, 0.5) at which the fraction of lags outside is not below alpha; none
-    /// if it is below at all of them. It orders models, and is no verdict: correct models stop early too.
+    /// The smallest alpha of a fine scale (0.001, 0.002, …, 0.5) at which the fraction of lags outside is not below
+    /// alpha; none if it is below at all of them. It orders models, and is no verdict: correct models stop early too.
     pub stops_at: Option<f64>,
 }
 
@@ -40,8 +40,8 @@ pub struct AndersonLevel {
     pub outside: usize,
     /// Whether as many outside are no surprise: whether `p_value` is not below the level of the validation.
     pub white: bool,
-    /// How often more are outside for white residuals, and half of how often as many are: the mid-p-value of the count, which
-    /// is about binomial.
+    /// How often more are outside for white residuals, and half of how often as many are: the mid-p-value of the count,
+    /// which is about binomial.
     pub p_value: f64,
 }
 
@@ -56,10 +56,11 @@ pub struct Independence {
     pub band: Vec<f64>,
     /// Past inputs, k = 1 … M: where they are in the residuals, the model lacks dynamics or delay.
     pub past: Test,
-    /// Future inputs, k = -M … -1: where they follow the residuals, there is feedback. Bonferroni's bound over the lags.
+    /// Future inputs, k = -M … -1: where they follow the residuals, there is feedback. Bonferroni's bound over the
+    /// lags.
     pub feedback: Test,
-    /// Whether feedback is suspected: past residuals predict the input beyond its own past, on rows left out too. A model that lacks
-    /// dynamics, and an input that predicts itself, make `feedback` small without that.
+    /// Whether feedback is suspected: past residuals predict the input beyond its own past, on rows left out too. A
+    /// model that lacks dynamics, and an input that predicts itself, make `feedback` small without that.
     #[serde(default)]
     pub suspected: bool,
 }

@@ -12,16 +12,16 @@
 //! r^_k = r_k - X_k (theta-hat - theta),   X_k = E psi(t) e(t - k)/sigma^2,
 //! ```
 //!
-//! so that sqrt(N) r^ has the covariance C: I - N X cov X' on the samples of the fit, with cov = sigma^2 (sum psi psi')^-1 (Box
-//! and Pierce 1970); I + N X cov X' on others, where the parameters' errors come on top. On the samples of the fit X follows
-//! from the model: past e is in psi by -1/A for a, 1/C for c and -1/D for d, each delayed by the coefficient's number, and
-//! not at all for B and F. Sums over the samples would take away directions by their noise (with 120 samples and 24 lags 11 to 13 %
-//! of true ARX and OE models were rejected at 5 %); on other samples it adds some, and sums are taken, which also hold in a
-//! loop. On the samples of the fit, what psi explains of e is taken off: nothing at the least sum of squares, and then
-//! r^ is that of any estimate close to the truth (Breusch 1978, Godfrey 1978). The statistic is
-//! N r^' C^-1 r^ over the directions that the fit has left free, those of eigenvalues above 0.05, with as many degrees of
-//! freedom. For C = I it is Q; on the samples of an ARMA model about L - na - nc directions are free, with inputs about
-//! L - nc - nd.
+//! so that sqrt(N) r^ has the covariance C: I - N X cov X' on the samples of the fit, with cov = sigma^2 (sum psi
+//! psi')^-1 (Box and Pierce 1970); I + N X cov X' on others, where the parameters' errors come on top. On the samples
+//! of the fit X follows from the model: past e is in psi by -1/A for a, 1/C for c and -1/D for d, each delayed by the
+//! coefficient's number, and not at all for B and F. Sums over the samples would take away directions by their noise
+//! (with 120 samples and 24 lags 11 to 13 % of true ARX and OE models were rejected at 5 %); on other samples it adds
+//! some, and sums are taken, which also hold in a loop. On the samples of the fit, what psi explains of e is taken off:
+//! nothing at the least sum of squares, and then r^ is that of any estimate close to the truth (Breusch 1978, Godfrey
+//! 1978). The statistic is N r^' C^-1 r^ over the directions that the fit has left free, those of eigenvalues above
+//! 0.05, with as many degrees of freedom. For C = I it is Q; on the samples of an ARMA model about L - na - nc
+//! directions are free, with inputs about L - nc - nd.
 
 use std::ops::Range;
 
@@ -34,8 +34,8 @@ use super::verdict::{Anderson, AndersonLevel, Test};
 
 /// Directions of which the fit has left less than this fraction say nothing.
 const FREE: f64 = 0.05;
-/// Anderson's test counts lags up to a twentieth of the samples: R(tau) has a variance of N/(N - tau), and with more lags
-/// more than a fraction alpha of them lies outside.
+/// Anderson's test counts lags up to a twentieth of the samples: R(tau) has a variance of N/(N - tau), and with more
+/// lags more than a fraction alpha of them lies outside.
 const SAMPLES_PER_ANDERSON_LAG: usize = 20;
 /// The deviation of a correlation that the fit has left none.
 const CERTAIN: f64 = 1e-9;
@@ -132,16 +132,17 @@ pub(super) fn chi_square(
     })
 }
 
-/// Anderson's test (Anderson 1942): chi(tau) = R(tau)/R(0) with R(tau) = sum e(t) e(t - tau)/N_tau is outside its band where
+/// Anderson's test (Anderson 1942): chi(tau) = R(tau)/R(0) with R(tau) = sum e(t) e(t - tau)/N_tau is outside its band
+/// where
 /// |sqrt(N) chi(tau)| exceeds the normal quantile of alpha/2; white residuals have about a fraction alpha outside. Where the
 /// parameters' errors make chi(tau) more variable than that, C_tau,tau above 1, the band is as much wider.
 ///
-/// The plain rule calls residuals white if a fraction below alpha is outside. Of 20 lags and alpha = 0.05 that is none, and
-/// white residuals are so in 36 of 100 logs: as a scale that orders models it serves (`stops_at`), as a verdict it does not.
-/// So the verdict asks how likely the count is: residuals are not white where its mid-p-value is below `level`. The count is
-/// about binomial, with the mean of what each lag is outside with: sqrt(N) chi(tau) has the variance N C_tau,tau/N_tau. Where C has
-/// correlations r_ij, lags are outside together, to second order of the events' Hermite series (Mehler's formula: Cramér,
-/// Mathematical Methods of Statistics, 1946, section 21.12)
+/// The plain rule calls residuals white if a fraction below alpha is outside. Of 20 lags and alpha = 0.05 that is none,
+/// and white residuals are so in 36 of 100 logs: as a scale that orders models it serves (`stops_at`), as a verdict it
+/// does not. So the verdict asks how likely the count is: residuals are not white where its mid-p-value is below
+/// `level`. The count is about binomial, with the mean of what each lag is outside with: sqrt(N) chi(tau) has the
+/// variance N C_tau,tau/N_tau. Where C has correlations r_ij, lags are outside together, to second order of the events'
+/// Hermite series (Mehler's formula: Cramér, Mathematical Methods of Statistics, 1946, section 21.12)
 ///
 /// ```text
 /// cov = sum_{m = 2, 4} c_m,i c_m,j r_ij^m/m!

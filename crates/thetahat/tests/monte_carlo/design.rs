@@ -17,8 +17,8 @@ fn output(model: &PolynomialModel, u: &[f64], random: &mut Random) -> Vec<f64> {
     filtered(&[1.0], &model.a, &sum)
 }
 
-/// Estimates of some orders with the level of the output as the coefficient of a second input of ones: the parameters without
-/// it, and the static gain.
+/// Estimates of some orders with the level of the output as the coefficient of a second input of ones: the parameters
+/// without it, and the static gain.
 fn estimated(orders: &Orders, y: &[f64], u: &[f64]) -> (Vec<f64>, PolynomialModel) {
     let ones = vec![1.0; y.len()];
     let record = Record::new(y, vec![u, &ones]).expect("the case is sound");
@@ -40,7 +40,8 @@ fn estimated(orders: &Orders, y: &[f64], u: &[f64]) -> (Vec<f64>, PolynomialMode
     (parameters, model)
 }
 
-/// The ratio of planned to simulated errors of each parameter and of the static gain, over many experiments with a signal.
+/// The ratio of planned to simulated errors of each parameter and of the static gain, over many experiments with a
+/// signal.
 fn assert_planned(orders: &Orders, truth: [&[f64]; 5], waveform: &str, length: usize) {
     let [a, b, c, d, f] = truth;
     // The truth is a model that was fitted: any will do.
@@ -78,8 +79,8 @@ fn assert_planned(orders: &Orders, truth: [&[f64]; 5], waveform: &str, length: u
             all.push(value - truth);
         }
     }
-    // About their mean: that of a short log is biased, which no covariance says. The standard deviation of n errors is known to
-    // 1/sqrt(2 n) of itself: beyond four times that it is another one.
+    // About their mean: that of a short log is biased, which no covariance says. The standard deviation of n errors is
+    // known to 1/sqrt(2 n) of itself: beyond four times that it is another one.
     let spread = 4.0 / (2.0 * runs as f64).sqrt();
     let mut ratios = Vec::new();
     for (((name, _), error), found) in figures.iter().zip(&errors).zip(&errors_found) {

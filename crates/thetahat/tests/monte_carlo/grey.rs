@@ -85,8 +85,8 @@ fn intervals_of_models_in_equations_cover_the_truth() {
                 covered += usize::from(away.abs() < 1.959964);
             }
         }
-        // Five numbers a run, not independent. With 60 runs the standard deviation of the share is about 1.5 %, of the mean
-        // square 10 %.
+        // Five numbers a run, not independent. With 60 runs the standard deviation of the share is about 1.5 %, of the
+        // mean square 10 %.
         let (count, spread) = ((5 * runs) as f64, (60.0 / runs as f64).sqrt());
         let (share, square) = (covered as f64 / count, squares / count);
         eprintln!("noise {noise}: {:.1} %, mean square {square:.3}", 100.0 * share);

@@ -1,5 +1,5 @@
-//! How often intervals hold: of predictions and forecasts, of gains and time constants near an integrator, and of output-error
-//! parameters in short logs.
+//! How often intervals hold: of predictions and forecasts, of gains and time constants near an integrator, and of
+//! output-error parameters in short logs.
 
 use std::ops::RangeInclusive;
 
@@ -66,8 +66,8 @@ fn fitted(record: &Record<'_>, orders: &Orders) -> PolynomialModel {
     found.to_model(orders, 1.0, inputs, Signal::default()).expect("the case is sound")
 }
 
-/// How often the 95 % intervals hold the outputs that follow the log of the fit, in percent: forecasts, and predictions of a
-/// fresh log; 1, 5 and 20 steps ahead.
+/// How often the 95 % intervals hold the outputs that follow the log of the fit, in percent: forecasts, and predictions
+/// of a fresh log; 1, 5 and 20 steps ahead.
 fn held(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2] {
     const STEPS: [usize; 3] = [1, 5, 20];
     let (mut held, mut counts) = ([[0_usize; 3]; 2], [[0_usize; 3]; 2]);
@@ -166,8 +166,8 @@ fn held_around_a_level(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2
     [0, 1].map(|which| [0, 1, 2].map(|at| 100.0 * held[which][at] as f64 / counts[which][at] as f64))
 }
 
-/// Near an integrator the estimate of a pole from a short log is too small, by several over N where a level is estimated too
-/// (Kendall, Biometrika 41 (1954)), and what is expected far ahead comes back to the level too soon.
+/// Near an integrator the estimate of a pole from a short log is too small, by several over N where a level is
+/// estimated too (Kendall, Biometrika 41 (1954)), and what is expected far ahead comes back to the level too soon.
 #[test]
 fn intervals_of_predictions_around_a_level_hold_the_outputs() {
     let runs = runs(40);
@@ -269,7 +269,8 @@ fn intervals_of_output_error_hold_in_short_logs() {
     }
 }
 
-/// Output error with 30 % of the outputs missing: standard errors are as large as the spread over runs, whatever the colour.
+/// Output error with 30 % of the outputs missing: standard errors are as large as the spread over runs, whatever the
+/// colour.
 #[test]
 fn standard_errors_are_right_with_missing_outputs() {
     let (runs, samples, before) = (runs(150), 500, 300);

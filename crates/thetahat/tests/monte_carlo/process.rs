@@ -14,8 +14,8 @@ const TRUTH: [f64; 3] = [2.0, 40.0, 6.3];
 /// Half of 95 % of the normal distribution.
 const QUANTILE: f64 = 1.959964;
 
-/// How often intervals hold each parameter of a first-order process with a dead time, in percent: those of any colour, and those for
-/// white errors. Noise has this pole, and a standard deviation of 0.05, beside steps of 1.
+/// How often intervals hold each parameter of a first-order process with a dead time, in percent: those of any colour,
+/// and those for white errors. Noise has this pole, and a standard deviation of 0.05, beside steps of 1.
 fn held(pole: f64, steps: &[f64], runs: usize) -> [[f64; 3]; 2] {
     let [gain, tau, theta] = TRUTH;
     let mut counts = [[0_usize; 3]; 2];
@@ -80,11 +80,12 @@ fn intervals_of_processes_hold_in_noise_of_any_colour() {
     }
 }
 
-/// The system of Rao and Garnier, with resonances at 2 and 20 rad/s: (-6400 s + 1600)/(s^4 + 5 s^3 + 408 s^2 + 416 s + 1600).
+/// The system of Rao and Garnier, with resonances at 2 and 20 rad/s: (-6400 s + 1600)/(s^4 + 5 s^3 + 408 s^2 + 416 s +
+/// 1600).
 const RESONANT: [f64; 6] = [-6400.0, 1600.0, 5.0, 408.0, 416.0, 1600.0];
 
-/// How often the intervals of its coefficients hold, in percent: an input of two levels that may change every seven rows, and white noise of
-/// a tenth of the power of the output.
+/// How often the intervals of its coefficients hold, in percent: an input of two levels that may change every seven
+/// rows, and white noise of a tenth of the power of the output.
 fn held_of_transfer_function(seconds: f64, rows: usize, runs: usize) -> [f64; 6] {
     let [b1, b0, a3, a2, a1, a0] = RESONANT;
     let continuous = ContinuousStateSpace {

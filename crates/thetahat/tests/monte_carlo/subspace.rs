@@ -116,7 +116,8 @@ fn steps() -> Vec<[f64; 21]> {
     (0..4).map(|pair| step(pair / 2, pair % 2)).collect()
 }
 
-/// How often 95 % intervals of poles, static gains, step and frequency responses cover the truth, each kind in all runs.
+/// How often 95 % intervals of poles, static gains, step and frequency responses cover the truth, each kind in all
+/// runs.
 fn assert_covers(refine: Refine) {
     let runs = runs(20).min(100);
     let plan = StateSpacePlan {

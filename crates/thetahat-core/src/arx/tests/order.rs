@@ -200,9 +200,9 @@ const FIRST_ORDER: [f64; 2] = [-0.9, 0.08];
 /// The standard deviation of e.
 const NOISE: f64 = 0.1;
 
-/// 2000 samples of y(k) = 0.9 y(k-1) + 0.08 u(k-1) + e(k) + c e(k-1), under steps of the set point. The controller is given
-/// y(k), u(k-1) and the set point, and returns u(k). Returns the root of the mean square of what is left to the set point,
-/// without the 20 samples after each step.
+/// 2000 samples of y(k) = 0.9 y(k-1) + 0.08 u(k-1) + e(k) + c e(k-1), under steps of the set point. The controller is
+/// given y(k), u(k-1) and the set point, and returns u(k). Returns the root of the mean square of what is left to the
+/// set point, without the 20 samples after each step.
 fn control(seed: u64, c: f64, mut controller: impl FnMut(f64, f64, f64) -> f64) -> f64 {
     let (mut noise, mut y, mut u, mut before) = (Noise(seed), 0.0, 0.0, 0.0);
     let (mut sum, mut count) = (0.0, 0);

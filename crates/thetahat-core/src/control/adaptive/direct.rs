@@ -26,7 +26,8 @@ pub struct DirectOrders {
     pub na: usize,
     /// The coefficients of its B(q) after the delay.
     pub nb: usize,
-    /// d, after how many samples the input acts, 1 or more. One too small does not work; where it may vary, take the largest.
+    /// d, after how many samples the input acts, 1 or more. One too small does not work; where it may vary, take the
+    /// largest.
     pub delay: usize,
     /// Whether there is a constant: where signals are not deviations from a working point, and where loads come.
     pub constant: bool,
@@ -56,17 +57,19 @@ impl DirectOrders {
     }
 }
 
-/// A controller whose own coefficients are estimated while it runs, for plants whose inverse is stable and whose delay is known.
+/// A controller whose own coefficients are estimated while it runs, for plants whose inverse is stable and whose delay
+/// is known.
 ///
 /// ```text
 /// y(k) = R(q) u_f(k-d) + S(q) y_f(k-d) + c + e(k),     A_o A_m u_f = u,   A_o A_m y_f = y
 /// R u = A_m(1) A_o (u_c - c) - S y,     then y(k) = A_m(1)/A_m u_c(k-d)
 /// ```
 ///
-/// The equation above is the plant's own, multiplied by a polynomial: no design is done in a step. All zeros of the plant are
-/// cancelled. Of 100 random plants of second order with stable inverses and the right delay 97 follow the set point; with a
-/// delay that is one too small none; with zeros outside of the unit circle 18, by chance (measured).
-/// [`IndirectSelfTuner`](crate::IndirectSelfTuner) needs to know neither, and looks at its margins: 98 to 100 of all kinds.
+/// The equation above is the plant's own, multiplied by a polynomial: no design is done in a step. All zeros of the
+/// plant are cancelled. Of 100 random plants of second order with stable inverses and the right delay 97 follow the set
+/// point; with a delay that is one too small none; with zeros outside of the unit circle 18, by chance (measured).
+/// [`IndirectSelfTuner`](crate::IndirectSelfTuner) needs to know neither, and looks at its margins: 98 to 100 of all
+/// kinds.
 ///
 /// Two ways to adapt: recursive least squares, or the normalised gradient of model-reference adaptive control
 /// ([`with_gradient`](DirectSelfTuner::with_gradient)), which is cheap, bounded without forgetting, and slow.
@@ -182,8 +185,8 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>> Adaptation<T, P> {
 impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> DirectSelfTuner<T, P, N, D> {
     /// A tuner that knows nothing yet. The scales are the usual sizes of the output and the input.
     ///
-    /// Errors: those of [`Lags::new`] and [`RecursiveLeastSquares::new`]; [`Error::Orders`] if `N` is not [`DirectOrders::size`];
-    /// [`Error::OutOfRange`] for a delay of 0, no coefficients, or a setting that is.
+    /// Errors: those of [`Lags::new`] and [`RecursiveLeastSquares::new`]; [`Error::Orders`] if `N` is not
+    /// [`DirectOrders::size`]; [`Error::OutOfRange`] for a delay of 0, no coefficients, or a setting that is.
     pub fn new(
         orders: &DirectOrders,
         settings: &TunerSettings<T>,
@@ -239,7 +242,8 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
     /// ε = y - φ'θ,     θ <- θ + γ W φ ε/(1 + φ'W φ),     W_jj = 1/scale_j²
     /// ```
     ///
-    /// It has no standard errors: the first controller comes after [`Probing::at_most`](crate::Probing::at_most) samples.
+    /// It has no standard errors: the first controller comes after [`Probing::at_most`](crate::Probing::at_most)
+    /// samples.
     ///
     /// Errors: [`Error::OutOfRange`] if γ is not above 0 and below 2.
     pub fn with_gradient(self, gain: T) -> Result<Self, Error> {
@@ -260,9 +264,11 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
         Ok(DirectSelfTuner { adaptation, ..self })
     }
 
-    /// The input from now on: time goes on by a sample, the coefficients are corrected by the measurement, and the controller acts.
+    /// The input from now on: time goes on by a sample, the coefficients are corrected by the measurement, and the
+    /// controller acts.
     ///
-    /// A measurement that is NaN is missing; see [`Sensor`](crate::Sensor). With a set point that is not finite the input stays as it was.
+    /// A measurement that is NaN is missing; see [`Sensor`](crate::Sensor). With a set point that is not finite the
+    /// input stays as it was.
     pub fn control(&mut self, set_point: T, measurement: T) -> T {
         if self.lags.awaits_inputs() {
             let input = self.filter.push(&mut self.filtered_inputs, self.closed.input);
@@ -316,16 +322,16 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> Di
             .act(set_point - offset, offset, &reading, output, || adaptation.knows_gain().unwrap_or(true))
     }
 
-    /// Tells that the actuator did something else than the latest [`control`](DirectSelfTuner::control) asked for. A number that
-    /// is not finite, or whose square would overflow in a regressor, is not taken.
+    /// Tells that the actuator did something else than the latest [`control`](DirectSelfTuner::control) asked for. A
+    /// number that is not finite, or whose square would overflow in a regressor, is not taken.
     pub fn applied(&mut self, input: T) {
         if !self.is_too_large(input) {
             self.closed.applied(input);
         }
     }
 
-    /// Excites the plant for so many samples: u = α u_c + (1 - α) u_f, where u_f is the controller's and u_c the same plus or minus
-    /// the largest amplitude of [`Probing`](crate::Probing).
+    /// Excites the plant for so many samples: u = α u_c + (1 - α) u_f, where u_f is the controller's and u_c the same
+    /// plus or minus the largest amplitude of [`Probing`](crate::Probing).
     ///
     /// Errors: [`Error::OutOfRange`] if α is not from 0 to 1.
     pub fn probe(&mut self, share: T, samples: u32) -> Result<(), Error> {

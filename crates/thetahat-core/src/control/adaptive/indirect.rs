@@ -24,29 +24,32 @@ use crate::{
 /// # Noise that is not white
 ///
 /// It biases the model of a [`RecursiveArx`]. [`RecursiveArmax`], the type `M`, estimates it too, with
-/// [`PredictionError`](crate::ArmaxMethod::PredictionError), and its C is a factor of A_o = C (1 - p q⁻¹), where p is the
-/// [`observer`](super::ResponseWanted::observer) that was wanted. Then C goes out of what the noise does,
+/// [`PredictionError`](crate::ArmaxMethod::PredictionError), and its C is a factor of A_o = C (1 - p q⁻¹), where p is
+/// the [`observer`](super::ResponseWanted::observer) that was wanted. Then C goes out of what the noise does,
 ///
 /// ```text
 /// y = R C/(A_m A_o) e = R/(A_m (1 - p q⁻¹)) e,   u = -S C/(A_m A_o) e = -S/(A_m (1 - p q⁻¹)) e
 /// ```
 ///
-/// as in the loop of least variance: C is the characteristic polynomial of the stationary Kalman filter of the model, and p is there
-/// for loads (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, chapter 12; Adaptive Control, 2nd ed. 1995, chapter 4).
-/// C is stable, as the estimator keeps it so. Where the loop has no good margins with it, as with a zero of C near to -1, the same
-/// response is tried without it.
+/// as in the loop of least variance: C is the characteristic polynomial of the stationary Kalman filter of the model,
+/// and p is there for loads (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, chapter 12; Adaptive
+/// Control, 2nd ed. 1995, chapter 4). C is stable, as the estimator keeps it so. Where the loop has no good margins
+/// with it, as with a zero of C near to -1, the same response is tried without it.
 ///
-/// With the plant (1 - 1.5 q⁻¹ + 0.7 q⁻²) y = (0.1 q⁻¹ + 0.05 q⁻²) u + (1 - 0.9 q⁻¹) e in a loop of frequency 0.6, damping 0.8 and
-/// p = 0.3, after 3000 samples with a set point that stays, a [`RecursiveArx`] has b_1 = 0.34 and a [`RecursiveArmax`] 0.09 with a
-/// standard error of 0.02; with the latter the output has three quarters of the variance, and the input a third (measured). It takes
-/// more samples to know more parameters, and n² + n numbers more: where the noise is nearly white a [`RecursiveArx`] is better.
+/// With the plant (1 - 1.5 q⁻¹ + 0.7 q⁻²) y = (0.1 q⁻¹ + 0.05 q⁻²) u + (1 - 0.9 q⁻¹) e in a loop of frequency 0.6,
+/// damping 0.8 and p = 0.3, after 3000 samples with a set point that stays, a [`RecursiveArx`] has b_1 = 0.34 and a
+/// [`RecursiveArmax`] 0.09 with a standard error of 0.02; with the latter the output has three quarters of the
+/// variance, and the input a third (measured). It takes more samples to know more parameters, and n² + n numbers more:
+/// where the noise is nearly white a [`RecursiveArx`] is better.
 ///
 /// # What keeps it safe
 ///
-/// - A new design is taken only where the largest sensitivities of its loop with the estimate are small, |1/(1 + L)| and |L/(1 + L)|
-///   below 2; slower responses are tried in turn, one in each sample. The last good controller goes on until one is found.
-/// - A model whose gain has another sign than was given gets no controller. Where none is given, the first controller waits until the
-///   static gain is known to five standard errors (or for [`Probing::at_most`] samples), and the sign is not changed by less either.
+/// - A new design is taken only where the largest sensitivities of its loop with the estimate are small, |1/(1 + L)|
+///   and |L/(1 + L)| below 2; slower responses are tried in turn, one in each sample. The last good controller goes on
+///   until one is found.
+/// - A model whose gain has another sign than was given gets no controller. Where none is given, the first controller
+///   waits until the static gain is known to five standard errors (or for [`Probing::at_most`] samples), and the sign
+///   is not changed by less either.
 /// - [`Forgetting`] keeps P bounded, in silence too. See below which is best.
 /// - The input stays within its limits, and no controller winds up there.
 /// - What a failed sensor does is [`Sensor`]'s subject.
@@ -60,9 +63,9 @@ use crate::{
 /// learning; the tuner controls again by itself where that has made the model good again. In a loop with a gain of 1.5,
 /// which was said to be positive, and which becomes negative, the input is at its limit for 45 to 130 samples, and then
 /// about where it was; after the plant is as before again it takes 200 to 1200 samples of excitation with a tenth of
-/// the usual input until that is known (measured). A dead time of twelve samples that the model does not know is told after
-/// about 170 samples. Of three times a hundred random plants that the model fits none was distrusted in 4900 samples
-/// each.
+/// the usual input until that is known (measured). A dead time of twelve samples that the model does not know is told
+/// after about 170 samples. Of three times a hundred random plants that the model fits none was distrusted in 4900
+/// samples each.
 ///
 /// # Which forgetting
 ///
@@ -79,8 +82,8 @@ use crate::{
 /// | selective, 0.99 | 96 | 0 | 9 | 98 | 1.33 |
 /// | random walk, 1e-4 | 97 | 0 | 5 | 98 | 1.28 |
 ///
-/// They differ little. [`Forgetting::RandomWalk`] with a variance of 1e-4 is recommended where the scales are right within
-/// a factor of a few, and exponential forgetting with a factor of 0.98 where they are not known.
+/// They differ little. [`Forgetting::RandomWalk`] with a variance of 1e-4 is recommended where the scales are right
+/// within a factor of a few, and exponential forgetting with a factor of 0.98 where they are not known.
 ///
 /// # What it does not do
 ///
@@ -95,8 +98,8 @@ use crate::{
 ///
 /// # Time
 ///
-/// [`control`](IndirectSelfTuner::control) is called once a sample. Where the actuator did something else than it was asked for,
-/// [`applied`](IndirectSelfTuner::applied) says so before the next sample.
+/// [`control`](IndirectSelfTuner::control) is called once a sample. Where the actuator did something else than it was
+/// asked for, [`applied`](IndirectSelfTuner::applied) says so before the next sample.
 ///
 /// # Size and cost
 ///
@@ -208,8 +211,8 @@ const TRY_ALL_AFTER: u16 = 25;
 impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T, P>>
     IndirectSelfTuner<T, P, N, M>
 {
-    /// A tuner that knows nothing yet. The scales are the usual sizes of the output and the input, as of [`RecursiveArx::new`]. The
-    /// noise scale of a [`RecursiveArmax`] is a tenth of that of the output.
+    /// A tuner that knows nothing yet. The scales are the usual sizes of the output and the input, as of
+    /// [`RecursiveArx::new`]. The noise scale of a [`RecursiveArmax`] is a tenth of that of the output.
     ///
     /// Errors: those of [`RecursiveArx::new`]; [`Error::Orders`] if `N` is not [`TunerOrders::size`];
     /// [`Error::OutOfRange`] for a setting that is, and for an nc above 0 with a [`RecursiveArx`].
@@ -258,8 +261,9 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T,
         Ok(IndirectSelfTuner { design_every: samples, ..self })
     }
 
-    /// The same with other limits of the larger one of the [`peaks`](RstController::peaks) of a design, 2 and 3 at first: below the first it is taken at
-    /// once, and if there is none the one with the least peaks is, below the second.
+    /// The same with other limits of the larger one of the [`peaks`](RstController::peaks) of a design, 2 and 3 at
+    /// first: below the first it is taken at once, and if there is none the one with the least peaks is, below the
+    /// second.
     ///
     /// Errors: [`Error::OutOfRange`] if they are not 1 or more and in order.
     pub fn with_peaks(self, good: T, bearable: T) -> Result<Self, Error> {
@@ -276,8 +280,8 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T,
         Ok(IndirectSelfTuner { plant: self.plant.with_start(start)?, ..self })
     }
 
-    /// The same with a model to start from, such as one that was fitted to a log: `plant` with the orders of this tuner. The
-    /// first controller is designed for it.
+    /// The same with a model to start from, such as one that was fitted to a log: `plant` with the orders of this
+    /// tuner. The first controller is designed for it.
     ///
     /// Errors: [`Error::OutOfRange`] if it has other orders.
     pub fn with_plant(self, plant: M) -> Result<Self, Error> {
@@ -289,9 +293,11 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T,
         Ok(tuner)
     }
 
-    /// The input from now on: time goes on by a sample, the model learns from the measurement, the controller is designed anew, and acts.
+    /// The input from now on: time goes on by a sample, the model learns from the measurement, the controller is
+    /// designed anew, and acts.
     ///
-    /// A measurement that is NaN is missing; see [`Sensor`]. With a set point that is not finite the input stays as it was.
+    /// A measurement that is NaN is missing; see [`Sensor`]. With a set point that is not finite the input stays as it
+    /// was.
     pub fn control(&mut self, set_point: T, measurement: T) -> T {
         let predicted = self.advance();
         let reading = self.closed.read(measurement, predicted);
@@ -317,14 +323,14 @@ impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, M: TunerModel<T,
         self.closed.act(set_point, T::zero(), &reading, output, || knows_gain(plant))
     }
 
-    /// Tells that the actuator did something else than the latest [`control`](IndirectSelfTuner::control) asked for. A number that
-    /// is not finite is not taken.
+    /// Tells that the actuator did something else than the latest [`control`](IndirectSelfTuner::control) asked for. A
+    /// number that is not finite is not taken.
     pub fn applied(&mut self, input: T) {
         self.closed.applied(input);
     }
 
-    /// Excites the plant for so many samples: u = α u_c + (1 - α) u_f, where u_f is the controller's and u_c the same plus or minus
-    /// the largest amplitude of [`Probing`].
+    /// Excites the plant for so many samples: u = α u_c + (1 - α) u_f, where u_f is the controller's and u_c the same
+    /// plus or minus the largest amplitude of [`Probing`].
     ///
     /// Errors: [`Error::OutOfRange`] if α is not from 0 to 1.
     pub fn probe(&mut self, share: T, samples: u32) -> Result<(), Error> {

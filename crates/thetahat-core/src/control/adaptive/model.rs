@@ -20,12 +20,13 @@ use crate::{
 pub struct TunerOrders {
     /// The order of A(q).
     pub na: usize,
-    /// The coefficients of B(q) = b_1 q⁻¹ + …: 2 for a plant of second order, and one more for each sample of dead time that there may
-    /// be.
+    /// The coefficients of B(q) = b_1 q⁻¹ + …: 2 for a plant of second order, and one more for each sample of dead time
+    /// that there may be.
     pub nb: usize,
     /// The order of C(q): 0 with a [`RecursiveArx`], the noise of which is white.
     pub nc: usize,
-    /// Whether the model has a constant: where the signals are not deviations from a working point, and where loads come.
+    /// Whether the model has a constant: where the signals are not deviations from a working point, and where loads
+    /// come.
     pub constant: bool,
     /// Whether the controller integrates.
     pub integrator: bool,
@@ -47,8 +48,8 @@ impl TunerOrders {
     }
 }
 
-/// A model that an [`IndirectSelfTuner`](crate::IndirectSelfTuner) can estimate: [`RecursiveArx`], or [`RecursiveArmax`] where the noise is not white. The
-/// trait is sealed.
+/// A model that an [`IndirectSelfTuner`](crate::IndirectSelfTuner) can estimate: [`RecursiveArx`], or
+/// [`RecursiveArmax`] where the noise is not white. The trait is sealed.
 pub trait TunerModel<T: Real, P: Dimension + Dimension<Const<1>>>: Estimated<T, P> {}
 
 impl<T: Real, P: Dimension + Dimension<Const<1>>, M: Estimated<T, P>> TunerModel<T, P> for M {}
@@ -80,7 +81,8 @@ pub trait Estimated<T: Real, P: Dimension + Dimension<Const<1>>>: Clone {
         self.lags().constant(self.estimator().parameters().as_slice()).is_some()
     }
 
-    /// The orders that it has, in a loop that integrates or not; `None` if it is no model of one input that acts on the next sample.
+    /// The orders that it has, in a loop that integrates or not; `None` if it is no model of one input that acts on the
+    /// next sample.
     fn orders(&self, integrator: bool) -> Option<TunerOrders> {
         let count = |coefficients: usize| coefficients.checked_sub(1);
         let (na, nb) = (count(self.a().count())?, count(self.b(0)?.count())?);

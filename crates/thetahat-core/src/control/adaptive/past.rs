@@ -7,7 +7,8 @@ use crate::Error;
 use crate::lags::shift;
 use crate::{Dimension, Real, RstController};
 
-/// What a controller with other coefficients has to know, to go on as if it had been there: the latest N samples, the newest first.
+/// What a controller with other coefficients has to know, to go on as if it had been there: the latest N samples, the
+/// newest first.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]

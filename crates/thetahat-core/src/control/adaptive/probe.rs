@@ -4,8 +4,9 @@ use crate::{Error, Real};
 
 /// How a self-tuner excites a plant that it does not know yet.
 ///
-/// Until there is a first controller the input is the one it starts with plus or minus an amplitude, in an order as if by chance. The
-/// amplitude doubles time and again, so that a plant of unknown gain is not driven further than it takes to see it.
+/// Until there is a first controller the input is the one it starts with plus or minus an amplitude, in an order as if
+/// by chance. The amplitude doubles time and again, so that a plant of unknown gain is not driven further than it takes
+/// to see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = "T: Real"))]

@@ -12,13 +12,13 @@ use crate::{Error, Real};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
 pub struct ResponseWanted<T> {
-    /// ω, the natural frequency of the response to the set point, in rad a sample; a response that settles within n samples has about
-    /// 4/(ζ n).
+    /// ω, the natural frequency of the response to the set point, in rad a sample; a response that settles within n
+    /// samples has about 4/(ζ n).
     pub frequency: T,
     /// ζ, above 0 and at most 1. 0.7 passes by a few per cent, 1 not at all.
     pub damping: T,
-    /// p, from 0 to below 1: how fast loads and errors of the model are forgotten, from one sample to slowly. Near to 1 the loop bears
-    /// more error of the model, and is quieter.
+    /// p, from 0 to below 1: how fast loads and errors of the model are forgotten, from one sample to slowly. Near to 1
+    /// the loop bears more error of the model, and is quieter.
     pub observer: T,
 }
 
@@ -52,11 +52,11 @@ impl<T: Real> ResponseWanted<T> {
         [T::one(), -self.observer]
     }
 
-    /// What is tried in its place where a model does not bear it: slower and more damped responses; at last, where `a` is stable,
-    /// its own poles, with a slow integral. `None` where there are no more.
+    /// What is tried in its place where a model does not bear it: slower and more damped responses; at last, where `a`
+    /// is stable, its own poles, with a slow integral. `None` where there are no more.
     ///
-    /// Last because the response to a set point is the plant's then. But where poles are faster than the response that is wanted,
-    /// and hardly damped, it takes a model that is nearly right to damp them.
+    /// Last because the response to a set point is the plant's then. But where poles are faster than the response that
+    /// is wanted, and hardly damped, it takes a model that is nearly right to damp them.
     ///
     /// Where the model has a C, each is tried with it as a factor of A_o, and then without.
     pub(super) fn candidate<'a>(&self, index: usize, a: &'a [T], c: &'a [T]) -> Option<Candidate<'a, T>> {

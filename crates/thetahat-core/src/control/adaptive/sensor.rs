@@ -6,11 +6,12 @@ use crate::{Error, Real};
 
 /// How a self-tuner tells that a sensor has failed, and what it does then.
 ///
-/// A measurement that is NaN is missing. One beyond the range is taken as the end of the range that it passed: what is too far is
-/// still known to be far, and a controller that held its input then would hold it for ever with a plant that integrates. The
-/// model learns from neither, nor from the next samples, whose regressors contain them. So the range should leave room for an
-/// excursion: a plant that begins to integrate, and leaves the range before that is learnt, takes long to come back (measured: of
-/// 100 changes of the plant after long silences three burst within a range of 8 times the set point, none within 20 times).
+/// A measurement that is NaN is missing. One beyond the range is taken as the end of the range that it passed: what is
+/// too far is still known to be far, and a controller that held its input then would hold it for ever with a plant that
+/// integrates. The model learns from neither, nor from the next samples, whose regressors contain them. So the range
+/// should leave room for an excursion: a plant that begins to integrate, and leaves the range before that is learnt,
+/// takes long to come back (measured: of 100 changes of the plant after long silences three burst within a range of 8
+/// times the set point, none within 20 times).
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = "T: Real"))]
@@ -18,12 +19,14 @@ pub struct Sensor<T> {
     /// What it can measure, in the unit of the output.
     #[cfg_attr(feature = "serde", serde(with = "crate::snapshot::range"))]
     pub range: RangeInclusive<T>,
-    /// So many equal measurements in a row are those of a sensor that is stuck: all but the first of them are missing from then
-    /// on. 0 for a sensor with so few digits that a working one repeats itself.
+    /// So many equal measurements in a row are those of a sensor that is stuck: all but the first of them are missing
+    /// from then on. 0 for a sensor with so few digits that a working one repeats itself.
     pub stuck_after: u16,
-    /// For so many missing samples in a row the controller goes on with what its model predicts, and then holds its input.
+    /// For so many missing samples in a row the controller goes on with what its model predicts, and then holds its
+    /// input.
     pub longest_gap: u16,
-    /// For so many samples after one that was missing or clipped nothing is learnt: the maximum lag of the model, or more.
+    /// For so many samples after one that was missing or clipped nothing is learnt: the maximum lag of the model, or
+    /// more.
     pub pause: u16,
 }
 

@@ -19,7 +19,8 @@ pub struct TunerSettings<T> {
     pub input: T,
     /// The sign of what the plant does first with a larger input: of its static gain for an
     /// [`IndirectSelfTuner`](crate::IndirectSelfTuner) (of its speed for a plant that integrates), of b_0 for a
-    /// [`DirectSelfTuner`](crate::DirectSelfTuner). 0 where it is not known. An estimate with the other sign gets no controller.
+    /// [`DirectSelfTuner`](crate::DirectSelfTuner). 0 where it is not known. An estimate with the other sign gets no
+    /// controller.
     pub gain_sign: T,
     /// How it starts.
     pub probing: Probing<T>,

@@ -1,7 +1,7 @@
 //! Regressions under limits: the smallest norm of the residuals, and how far parameters can go.
 //!
-//! With the triangular factor T of all rows (T'T = Phi'Phi, plus the rows of a ridge and of equalities), a feasible point
-//! b and a unit s of the residuals, the variables are w in
+//! With the triangular factor T of all rows (T'T = Phi'Phi, plus the rows of a ridge and of equalities), a feasible
+//! point b and a unit s of the residuals, the variables are w in
 //!
 //! ```text
 //! theta = b + s S w,   S = sqrt(N) T^-1,   e(t)/s = e_b(t)/s - q(t)'w,   q(t) = S' phi(t),   sum q q' = N I,
@@ -13,8 +13,9 @@
 //!
 //! Few samples matter, and only these are in the program:
 //!
-//! - a bound on |e|, and the largest |e|, hold p + 1 samples. The program begins with those of the largest |e_b|; samples
-//!   that its optimum violates are added, until there is none (Remez 1934; Kelley 1960, the cutting-plane method).
+//! - a bound on |e|, and the largest |e|, hold p + 1 samples. The program begins with those of the largest |e_b|;
+//!   samples that its optimum violates are added, until there is none (Remez 1934; Kelley 1960, the cutting-plane
+//!   method).
 //! - sum |e| is linear in the samples that keep their sign. Those far from zero are added up to two sums, of which the
 //!   absolute values are a lower bound, and exact if no sign is wrong; samples with a wrong sign are taken out of the
 //!   sum and the program is solved again (Portnoy and Koenker, The Gaussian hare and the Laplacian tortoise,
@@ -210,8 +211,8 @@ impl<'a> Fitting<'a> {
 
     /// Whether there are parameters that meet some limits.
     ///
-    /// Bounds of single parameters are compared exactly. Else all rows are loosened by t times (1 + their right side), in
-    /// units in which regressors and y have an RMS of 1, and the smallest t is found: 0 if they are possible.
+    /// Bounds of single parameters are compared exactly. Else all rows are loosened by t times (1 + their right side),
+    /// in units in which regressors and y have an RMS of 1, and the smallest t is found: 0 if they are possible.
     pub fn possible(&self, limits: &[Limit]) -> Result<bool, Failure> {
         let size = self.sizes.len();
         let mut ends = vec![(f64::NEG_INFINITY, f64::INFINITY); size];
@@ -284,8 +285,8 @@ impl<'a> Fitting<'a> {
         Ok(Solved { iterations: central.iterations + solved.iterations, ..solved })
     }
 
-    /// The parameters of the smallest norm, 1 or inf, under the limits and close to zero: |w| is at most `radius` in each
-    /// entry, in units of the RMS of y. A parameter moves the residuals by that RMS, in theirs, where its w is 1.
+    /// The parameters of the smallest norm, 1 or inf, under the limits and close to zero: |w| is at most `radius` in
+    /// each entry, in units of the RMS of y. A parameter moves the residuals by that RMS, in theirs, where its w is 1.
     ///
     /// # Errors
     /// [`Failure::Unsolved`].
@@ -434,8 +435,8 @@ impl<'a> Fitting<'a> {
         Err(Failure::Unsolved(format!("no end after {ROUNDS} rounds")))
     }
 
-    /// Adds the ends of limits that the parameters violate; how far they do at most, in units of w times `unit`, and 0 if
-    /// none is new.
+    /// Adds the ends of limits that the parameters violate; how far they do at most, in units of w times `unit`, and 0
+    /// if none is new.
     fn violated_limits(&self, working: &mut Working, parameters: &DVector<f64>, unit: f64) -> f64 {
         let mut worst = 0.0_f64;
         for (index, limit) in self.limits.iter().enumerate() {
@@ -522,9 +523,9 @@ impl<'a> Fitting<'a> {
     /// A radius of |w| that holds every optimum, where a program of few samples alone may be unbounded; a strong ridge,
     /// and least squares, bound it already.
     ///
-    /// Let J be what b gives for each sample, which no optimum exceeds, and m the norm of e_b without the ridge. Then the
-    /// way d from b to an optimum has `|Phi d| <= sqrt(N) (m + J)`, or N of that for the sum of |e|, and
-    /// `k sum (r d)^2 <= 4 N r_y J`.
+    /// Let J be what b gives for each sample, which no optimum exceeds, and m the norm of e_b without the ridge. Then
+    /// the way d from b to an optimum has `|Phi d| <= sqrt(N) (m + J)`, or N of that for the sum of |e|, and `k sum (r
+    /// d)^2 <= 4 N r_y J`.
     fn radius(&self, frame: &Frame, working: &Working, norm: Norm) -> Option<f64> {
         let residuals = &frame.residuals;
         let count = residuals.len() as f64;

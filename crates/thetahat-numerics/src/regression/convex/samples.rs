@@ -150,8 +150,8 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// The `count` samples with the largest `|residuals|` above `level` that are not among `known`, the largest first: number,
-/// and whether the residual is positive.
+/// The `count` samples with the largest `|residuals|` above `level` that are not among `known`, the largest first:
+/// number, and whether the residual is positive.
 pub(super) fn largest(
     residuals: &[f64],
     level: f64,

@@ -6,8 +6,9 @@
 //! prod_i (x_i - m_i) = sum over the sets A of its factors  prod_{i in A} x_i  prod_{i not in A} (-m_i),
 //! ```
 //!
-//! so that the columns of some monomials and of all their divisors, one among them, are combinations T of those about another centre, and
-//! their sums S <- T S T'. Sums that were made about the mean of a part of the data keep their digits, and are moved to that of all.
+//! so that the columns of some monomials and of all their divisors, one among them, are combinations T of those about
+//! another centre, and their sums S <- T S T'. Sums that were made about the mean of a part of the data keep their
+//! digits, and are moved to that of all.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -28,7 +29,8 @@ const MOST_COLUMNS: usize = 1000;
 pub struct DividedMonomials {
     /// Where each stands among the columns.
     places: BTreeMap<Vec<usize>, usize>,
-    /// In the order of the columns, those after one and the target: the column without the last factor, and that factor.
+    /// In the order of the columns, those after one and the target: the column without the last factor, and that
+    /// factor.
     parents: Vec<(usize, usize)>,
     variables: usize,
 }
@@ -77,7 +79,8 @@ impl DividedMonomials {
         self.places.get(&sorted).copied()
     }
 
-    /// The sums over some rows. `variable` fills the values of a variable, the target after them, from a row on. O(N M^2) for M columns.
+    /// The sums over some rows. `variable` fills the values of a variable, the target after them, from a row on. O(N
+    /// M^2) for M columns.
     pub fn sums(&self, rows: usize, variable: impl Fn(usize, usize, &mut [f64])) -> ExtendedGram {
         let size = self.size();
         let mut triangle: Vec<Vec<fx128>> = (0..size).map(|row| vec![fx128::ZERO; size - row]).collect();

@@ -36,7 +36,8 @@ fn errors_of_a_first_order_model_are_those_of_the_formula() {
     assert_eq!(known.degrees_of_freedom, Some(count - 1 - 3));
 }
 
-/// sum_t psi psi' of the input by differences of the free run, where A = C = D = 1 and psi = dy/dtheta; with a column of ones.
+/// sum_t psi psi' of the input by differences of the free run, where A = C = D = 1 and psi = dy/dtheta; with a column
+/// of ones.
 fn by_differences(orders: &Orders, parameters: &[f64], u: &[f64], before: usize) -> Vec<Vec<f64>> {
     let long = [vec![u[0]; before], u.to_vec()].concat();
     let run = |parameters: &[f64]| {

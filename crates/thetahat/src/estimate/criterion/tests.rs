@@ -1,4 +1,5 @@
-//! Fits under a criterion: against linear programs of another solver, conditions of optimality, and vertices one by one.
+//! Fits under a criterion: against linear programs of another solver, conditions of optimality, and vertices one by
+//! one.
 
 mod reference;
 mod refusals;

@@ -1,4 +1,5 @@
-//! The likelihood of a model in equations over experiments that others hold too: its value and its slopes are sums over them.
+//! The likelihood of a model in equations over experiments that others hold too: its value and its slopes are sums over
+//! them.
 
 use super::Holders;
 use super::message::{Asked, Found, LikelihoodSums};

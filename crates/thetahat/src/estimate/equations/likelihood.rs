@@ -8,11 +8,11 @@
 //! I_ij  = sum (e_i e_j/S + S_i S_j/(2 S^2))
 //! ```
 //!
-//! V is the negative logarithm of the likelihood if the innovations are Gaussian; I, what is expected of its Hessian at the
-//! truth (Gupta and Mehra, Computational aspects of maximum likelihood estimation, IEEE Transactions on Automatic Control
-//! 19, 1974; Segal and Weinstein, A new method for evaluating the log-likelihood gradient, the Hessian, and the Fisher
-//! information matrix for linear dynamic systems, IEEE Transactions on Information Theory 35, 1989; Ljung, System
-//! Identification, 2nd ed. 1999, sections 7.4 and 7.6).
+//! V is the negative logarithm of the likelihood if the innovations are Gaussian; I, what is expected of its Hessian at
+//! the truth (Gupta and Mehra, Computational aspects of maximum likelihood estimation, IEEE Transactions on Automatic
+//! Control 19, 1974; Segal and Weinstein, A new method for evaluating the log-likelihood gradient, the Hessian, and the
+//! Fisher information matrix for linear dynamic systems, IEEE Transactions on Information Theory 35, 1989; Ljung,
+//! System Identification, 2nd ed. 1999, sections 7.4 and 7.6).
 
 use std::f64::consts::TAU;
 
@@ -125,8 +125,8 @@ impl Likelihood for LikelihoodObjective<'_> {
         Ok(sum / 2.0)
     }
 
-    /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, and N p^2. Slopes that are not finite
-    /// are a failure too.
+    /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, and N p^2. Slopes that are not
+    /// finite are a failure too.
     fn linearize(&mut self, z: &[f64]) -> Result<(), Failure> {
         for (lane, variables) in self.variables.iter_mut().enumerate() {
             for (index, (variable, &value)) in variables.iter_mut().zip(z).enumerate() {

@@ -6,15 +6,17 @@
 //! A step = -V',   A = I + diag(c_i),   c_i = |V_i| of a parameter with bounds, 0 of the others
 //! ```
 //!
-//! c_i is the most that the curvature of p(z) adds to that of V: for p = min + exp(z), V_p p'' = V_z. It vanishes at a minimum, and keeps
-//! a parameter that is drawn to its bound from running away: there I_ii and V_i vanish together, and V_i^2/I_ii does not.
+//! c_i is the most that the curvature of p(z) adds to that of V: for p = min + exp(z), V_p p'' = V_z. It vanishes at a
+//! minimum, and keeps a parameter that is drawn to its bound from running away: there I_ii and V_i vanish together, and
+//! V_i^2/I_ii does not.
 //!
-//! Where V falls by more than predicted, as on a plateau far from the minimum, a step is doubled as long as V falls further: there the
-//! sum of e_i e_j/S says more about e than about V. That halves the iterations from starts that are far away. Steps that raise V are
-//! damped at once: halving them first costs more evaluations, and leads no more starts to the largest likelihood.
+//! Where V falls by more than predicted, as on a plateau far from the minimum, a step is doubled as long as V falls
+//! further: there the sum of e_i e_j/S says more about e than about V. That halves the iterations from starts that are
+//! far away. Steps that raise V are damped at once: halving them first costs more evaluations, and leads no more starts
+//! to the largest likelihood.
 //!
-//! The search stops when the predicted decrease is below the tolerance times max(N, sum e^2/S), N the elements that were measured. That
-//! is 2 V without its logarithms, which may be of either sign.
+//! The search stops when the predicted decrease is below the tolerance times max(N, sum e^2/S), N the elements that
+//! were measured. That is 2 V without its logarithms, which may be of either sign.
 
 use thetahat_numerics::optimize::{Objective, StepRules};
 

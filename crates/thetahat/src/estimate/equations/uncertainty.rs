@@ -1,7 +1,7 @@
 //! How certain the parameters are.
 //!
-//! cov(z) = I^-1 (Ljung, System Identification, 2nd ed. 1999, section 7.4), and cov(p) = J cov(z) J with J = diag(dp/dz), the
-//! delta method.
+//! cov(z) = I^-1 (Ljung, System Identification, 2nd ed. 1999, section 7.4), and cov(p) = J cov(z) J with J =
+//! diag(dp/dz), the delta method.
 
 use thetahat_core::nalgebra::{DMatrix, SymmetricEigen};
 
@@ -16,8 +16,8 @@ const PART: f64 = 0.1;
 /// A standard error of so many times the size of a parameter says that nothing is known of it.
 const AWAY: f64 = 1e6;
 
-/// The covariance of the parameters in their own units, `slopes` being dp/dz, and the condition of the problem: the ratio of the
-/// longest to the shortest direction of the information's root with a unit diagonal.
+/// The covariance of the parameters in their own units, `slopes` being dp/dz, and the condition of the problem: the
+/// ratio of the longest to the shortest direction of the information's root with a unit diagonal.
 ///
 /// # Errors
 /// [`Error::Undetermined`] that names the parameters of a singular information.
@@ -67,8 +67,8 @@ pub(super) fn covariance(
     Ok((covariance, (eigenvalues.max() / eigenvalues.min()).sqrt()))
 }
 
-/// Refuses a parameter that the search has drawn to where it has hardly an effect, as a time constant that grows without
-/// bound: nothing is known of it there.
+/// Refuses a parameter that the search has drawn to where it has hardly an effect, as a time constant that grows
+/// without bound: nothing is known of it there.
 ///
 /// # Errors
 /// [`Error::Undetermined`] that names the first such parameter.

@@ -4,26 +4,27 @@
 //! A(q) z = C(q) e:   s(t+1) = T s(t) + K e(t),   z(t) = h's(t) + e(t),   h = (1, 0, …, 0)'
 //! ```
 //!
-//! T is the companion matrix with -a_1 … -a_m in its first column and ones above the diagonal, K = (c_1 - a_1, …, c_m - a_m)',
-//! m = max(na, nc) (Hannan and Deistler, The Statistical Theory of Linear Systems, 1988, section 1.2; Harvey's form, 1989, section
-//! 3.3, has one state more where nc = na). In units of var e the state begins with its stationary covariance
+//! T is the companion matrix with -a_1 … -a_m in its first column and ones above the diagonal, K = (c_1 - a_1, …, c_m -
+//! a_m)', m = max(na, nc) (Hannan and Deistler, The Statistical Theory of Linear Systems, 1988, section 1.2; Harvey's
+//! form, 1989, section 3.3, has one state more where nc = na). In units of var e the state begins with its stationary
+//! covariance
 //!
 //! ```text
 //! P = T P T' + K K'
 //! ```
 //!
-//! (Gardner, Harvey and Phillips, Applied Statistics 29, 1980, AS 154), by doubling: P <- P + M P M', M <- M^2 from P = K K',
-//! M = T (Smith, SIAM J. Applied Mathematics 16, 1968). As e is the noise of the measurement too, it is K' = T - K h', the
-//! companion matrix of C, that carries P on. With w = P h and f = 1 + h'P h
+//! (Gardner, Harvey and Phillips, Applied Statistics 29, 1980, AS 154), by doubling: P <- P + M P M', M <- M^2 from P =
+//! K K', M = T (Smith, SIAM J. Applied Mathematics 16, 1968). As e is the noise of the measurement too, it is K' = T -
+//! K h', the companion matrix of C, that carries P on. With w = P h and f = 1 + h'P h
 //!
 //! ```text
 //! measured:  v = z - h's,   s <- T (s + w v/f) + K v/f,   P <- K' (P - w w'/f) K''
 //! missing:                  s <- T s,                     P <- T P T' + K K'
 //! ```
 //!
-//! (Jones, Technometrics 22, 1980, for missing values). After a measured value the rest of P dies away with the squares of the
-//! zeros of C: once it has, f = 1 and the recursion is e = v, O(m) a sample and no more (Pearlman, Biometrika 67, 1980). The
-//! derivatives are those of these equations, one by one; P depends on A and C alone.
+//! (Jones, Technometrics 22, 1980, for missing values). After a measured value the rest of P dies away with the squares
+//! of the zeros of C: once it has, f = 1 and the recursion is e = v, O(m) a sample and no more (Pearlman, Biometrika
+//! 67, 1980). The derivatives are those of these equations, one by one; P depends on A and C alone.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 
@@ -55,8 +56,8 @@ pub(super) struct Process {
 }
 
 impl Process {
-    /// The process of monic A and C; `slopes` where derivatives are wanted. None where the covariance overflows, as for a root of
-    /// A on the unit circle.
+    /// The process of monic A and C; `slopes` where derivatives are wanted. None where the covariance overflows, as for
+    /// a root of A on the unit circle.
     pub(super) fn new(a: &[f64], c: &[f64], slopes: bool) -> Option<Self> {
         let size = (a.len() - 1).max(c.len() - 1).max(1);
         let padded = |monic: &[f64]| {
@@ -164,8 +165,8 @@ impl<'p> Filter<'p> {
         }
     }
 
-    /// Takes z(t) in, of which the derivatives are `slopes`, and goes on to t + 1. O(m^2) for each coefficient and O(m) for each
-    /// column, or the latter alone where the covariance has settled.
+    /// Takes z(t) in, of which the derivatives are `slopes`, and goes on to t + 1. O(m^2) for each coefficient and O(m)
+    /// for each column, or the latter alone where the covariance has settled.
     pub(super) fn measured(&mut self, value: f64, slopes: &[f64]) -> Innovation<'_> {
         let Process { size, a, gain, coefficients, .. } = self.process;
         let size = *size;

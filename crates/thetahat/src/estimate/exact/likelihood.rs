@@ -34,7 +34,8 @@ struct Section<'a> {
     /// The weights of impulses into 1/A in its first rows: of the current point, and tried.
     free: Vec<f64>,
     trial: Vec<f64>,
-    /// For the normal equations: the factor of the weights' own matrix, its part with the parameters, and the right-hand side.
+    /// For the normal equations: the factor of the weights' own matrix, its part with the parameters, and the
+    /// right-hand side.
     factor: Vec<f64>,
     cross: Vec<f64>,
     right: Vec<f64>,
@@ -141,8 +142,8 @@ impl<'a> Likelihood<'a> {
         self.sums.squares
     }
 
-    /// The inverse of the matrix of the normal equations, row by row, and the condition number of a psi with this Gram matrix;
-    /// none where it is singular to rounding.
+    /// The inverse of the matrix of the normal equations, row by row, and the condition number of a psi with this Gram
+    /// matrix; none where it is singular to rounding.
     pub(super) fn inverse(&self) -> Option<(DMatrix<f64>, f64)> {
         let size = self.right.len();
         let matrix = DMatrix::from_row_slice(size, size, &self.matrix);
@@ -165,8 +166,8 @@ impl<'a> Likelihood<'a> {
     }
 }
 
-/// The signals of a section that the response to the inputs and its derivatives are made of. Each begins `lead` rows before the
-/// section, with zeros or as a line.
+/// The signals of a section that the response to the inputs and its derivatives are made of. Each begins `lead` rows
+/// before the section, with zeros or as a line.
 struct Signals {
     lead: usize,
     /// x, what the inputs do to the output.
@@ -310,15 +311,15 @@ impl Objective for Likelihood<'_> {
         if cost.is_finite() { Ok(cost) } else { Err(Unusable::Overflow) }
     }
 
-    /// With dv and df the derivatives of an innovation and of its variance, the information of the parameters, var e known up to
-    /// its own estimate S/N, is
+    /// With dv and df the derivatives of an innovation and of its variance, the information of the parameters, var e
+    /// known up to its own estimate S/N, is
     ///
     /// ```text
     /// I = N/S sum dv dv'/f + 1/2 sum df df'/f^2 - 1/(2 N) (sum df/f) (sum df/f)'
     /// ```
     ///
-    /// (Harvey 1989, section 3.4.5, and the part of var e taken out), and -grad ln L = N/2 grad ln cost. So the normal equations of a
-    /// Gauss-Newton step of the cost are those of Fisher scoring times cost/N.
+    /// (Harvey 1989, section 3.4.5, and the part of var e taken out), and -grad ln L = N/2 grad ln cost. So the normal
+    /// equations of a Gauss-Newton step of the cost are those of Fisher scoring times cost/N.
     fn linearize(&mut self) -> Result<f64, Unusable> {
         let (size, places) = (self.right.len(), self.places());
         let (samples, Sums { squares, logarithms }) = (self.samples as f64, &self.sums);

@@ -248,8 +248,8 @@ fn impulse(length: usize) -> Vec<f64> {
     (0..length).map(|t| if t == 0 { 1.0 } else { 0.0 }).collect()
 }
 
-/// S exp(sum ln f/N) from the covariance matrix of the measured outputs after `first`, of which the last `free` impulse responses of
-/// 1/A are taken by generalised least squares; and N.
+/// S exp(sum ln f/N) from the covariance matrix of the measured outputs after `first`, of which the last `free` impulse
+/// responses of 1/A are taken by generalised least squares; and N.
 fn dense(experiment: &Experiment, first: usize, rest: bool, free: usize, theta: &[f64]) -> (f64, usize) {
     let [a1, a2, b1, b2, c1] = theta else { panic!("five parameters") };
     let (a, c) = ([1.0, *a1, *a2], [1.0, *c1]);
@@ -345,8 +345,8 @@ fn standard_errors_are_as_large_as_the_errors() {
         let record = experiment.record(0);
         let found = fit(&record, &orders(), Initial::Auto).unwrap();
         let Some(covariance) = found.covariance() else {
-            // The likelihood is largest at a root of C on the unit circle, as in some short logs: a search from the truth ends
-            // there too.
+            // The likelihood is largest at a root of C on the unit circle, as in some short logs: a search from the
+            // truth ends there too.
             let from_truth = Search { initial_parameters: Some(TRUTH.to_vec()), ..Search::default() };
             let other =
                 exact(&record, 0, &orders(), Initial::Auto, &from_truth, &|_| ControlFlow::Continue(()))

@@ -108,7 +108,8 @@ fn slopes_are_differences_of_values() {
     }
 }
 
-/// Far fewer parameters are free than there are taps, and the response is nearer to the truth than that of least squares.
+/// Far fewer parameters are free than there are taps, and the response is nearer to the truth than that of least
+/// squares.
 #[test]
 fn a_prior_takes_noise_off_the_response() {
     let [y, u, v] = record(150, 1.0);

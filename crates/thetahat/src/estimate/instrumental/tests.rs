@@ -18,7 +18,8 @@ fn response(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> 
     x
 }
 
-/// y = (B/F) u + v, v being noise of standard deviation `size` coloured by 1/D; the first 500 samples are not in the record.
+/// y = (B/F) u + v, v being noise of standard deviation `size` coloured by 1/D; the first 500 samples are not in the
+/// record.
 struct Experiment {
     u: Vec<f64>,
     y: Vec<f64>,
@@ -51,8 +52,8 @@ fn refined(record: &Record<'_>, initial: Initial) -> Estimate {
     refined_instrumental_variables(record, &Orders::oe(&[2], &[2], &[1]).unwrap(), initial).unwrap()
 }
 
-/// Of a number of estimates of the same parameters: how far their mean is from the truth in standard errors of that mean, and
-/// how often the truth is within 1.96 of their own standard errors, for each parameter.
+/// Of a number of estimates of the same parameters: how far their mean is from the truth in standard errors of that
+/// mean, and how often the truth is within 1.96 of their own standard errors, for each parameter.
 fn consistency(estimates: &[Estimate], truth: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let count = estimates.len() as f64;
     let of = |k: usize| estimates.iter().map(move |estimate| estimate.parameters()[k] - truth[k]);

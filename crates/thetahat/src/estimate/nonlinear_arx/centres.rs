@@ -88,8 +88,8 @@ pub(crate) fn clusters(points: &[Vec<f64>], count: usize, seed: u64) -> Vec<Vec<
     centres
 }
 
-/// Functions at some points. Without a width, each is as wide as it takes to overlap with its nearest neighbour; or all alike, by the
-/// spread of the points of the fit.
+/// Functions at some points. Without a width, each is as wide as it takes to overlap with its nearest neighbour; or all
+/// alike, by the spread of the points of the fit.
 pub(crate) fn map(
     centres: Vec<Vec<f64>>,
     width: Option<f64>,

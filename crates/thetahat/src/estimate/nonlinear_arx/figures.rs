@@ -12,8 +12,8 @@ use crate::model::NonlinearArxModel;
 use crate::respond::nonlinear_arx::{NonlinearArxOnLog, within};
 use crate::respond::{Horizon, InitialCondition, OnLog};
 
-/// A choice prefers models whose free run stays within this many times the range of the estimation rows, and of those it runs over, about
-/// its middle.
+/// A choice prefers models whose free run stays within this many times the range of the estimation rows, and of those
+/// it runs over, about its middle.
 const RANGE: f64 = 1.1;
 
 /// How the maps of a nonlinear ARX model were chosen.
@@ -28,16 +28,16 @@ pub struct MapsOutcome {
 pub struct TermsOutcome {
     /// The functions to choose from.
     pub candidates: usize,
-    /// What said how many to take, or which of those tried: `given`, the word of an information criterion, `validation` (the free run on the
-    /// validation rows) or `cv` (that on five blocks, each by a model of the others).
+    /// What said how many to take, or which of those tried: `given`, the word of an information criterion, `validation`
+    /// (the free run on the validation rows) or `cv` (that on five blocks, each by a model of the others).
     pub selected_by: String,
     /// What was added to the squares of the functions, in samples; none: nothing.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ridge: Option<f64>,
     /// How many steps of the path the model has; of nearest neighbours, which step it is.
     pub taken: usize,
-    /// The functions in the order of their choice, those that were not taken too; of local models the splits, of nearest neighbours
-    /// the numbers that were tried, and of trained maps the maps that were.
+    /// The functions in the order of their choice, those that were not taken too; of local models the splits, of
+    /// nearest neighbours the numbers that were tried, and of trained maps the maps that were.
     pub path: Vec<TermStep>,
     /// How the numbers were found, where more was to be found than one solution says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,24 +77,26 @@ pub struct TrainingOutcome {
 /// A step of the choice: the model with this term, or split, and those before.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TermStep {
-    /// The function that is added, such as u(k-1)^2; the split of a box, such as split(u(k-1), 0.5); a number of neighbours; or a map that
-    /// was tried, such as 2 tanh units.
+    /// The function that is added, such as u(k-1)^2; the split of a box, such as split(u(k-1), 0.5); a number of
+    /// neighbours; or a map that was tried, such as 2 tanh units.
     pub term: String,
     /// The parameters of the model; of nearest neighbours, samples for each that is asked.
     pub parameters: usize,
-    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before; of nearest neighbours,
-    /// the share that they explain.
+    /// Its error reduction ratio: the share of the sum of squared outputs that it explains beside those before; of
+    /// nearest neighbours, the share that they explain.
     pub error_reduction: f64,
     /// Functions that can no longer be told from sums of those chosen.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<String>,
-    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output; of nearest neighbours,
-    /// on five blocks of these rows, each by the samples of the others.
+    /// The root mean square of the errors one step ahead on the estimation rows, in units of the output; of nearest
+    /// neighbours, on five blocks of these rows, each by the samples of the others.
     pub rmse: f64,
-    /// The free run on the estimation rows; none of a step after which functions that are always there are still to come.
+    /// The free run on the estimation rows; none of a step after which functions that are always there are still to
+    /// come.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_run: Option<RunFigures>,
-    /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no inputs.
+    /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no
+    /// inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<RunFigures>,
 }
@@ -109,7 +111,8 @@ pub struct RunFigures {
     /// 100 (1 - |y - y^|/|y - mean y|): the fit, in percent; none likewise, or where the output is constant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub percent: Option<f64>,
-    /// Whether the run stays within 1.1 times the range of the output in the estimation rows and in those of the run, about its middle.
+    /// Whether the run stays within 1.1 times the range of the output in the estimation rows and in those of the run,
+    /// about its middle.
     pub in_range: bool,
 }
 
@@ -140,16 +143,17 @@ impl RunFigures {
         run(model, log, rows).map(Sums::figures)
     }
 
-    /// Smaller is better: those out of range come last, and those without a figure after them. To stay in range is no merit of a run that
-    /// is no better than the mean of the output.
+    /// Smaller is better: those out of range come last, and those without a figure after them. To stay in range is no
+    /// merit of a run that is no better than the mean of the output.
     pub(crate) fn rank(self) -> (bool, f64) {
         let is_useless = self.percent.is_some_and(|percent| percent <= 0.0);
         (!self.in_range || is_useless, self.rmse.unwrap_or(f64::INFINITY))
     }
 }
 
-/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it. A run strays that leaves the
-/// range of the estimation rows and of what was measured in these: a model that follows an output to where it has not been is no worse.
+/// What a model misses on some rows of a log: in its free run, or one step ahead where nothing drives it. A run strays
+/// that leaves the range of the estimation rows and of what was measured in these: a model that follows an output to
+/// where it has not been is no worse.
 pub(super) fn run(model: &NonlinearArxModel, log: &Log, rows: &[Rows]) -> Result<Sums, Error> {
     let on_log = NonlinearArxOnLog::new(model, log, rows)?;
     let horizon = if on_log.is_driven() { Horizon::FreeRun } else { Horizon::Steps { steps: 1 } };

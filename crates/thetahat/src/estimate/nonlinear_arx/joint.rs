@@ -17,7 +17,8 @@ pub(crate) struct Joint {
     pub(crate) condition: Option<f64>,
 }
 
-/// Joins models of single outputs that were fitted to the same samples of the same regressors. Each is a regression of its own,
+/// Joins models of single outputs that were fitted to the same samples of the same regressors. Each is a regression of
+/// its own,
 ///
 /// ```text
 /// y_i = F_i theta_i + e_i,   cov(theta_i, theta_j) = sigma_ij (F_i' F_i)^-1 F_i' F_j (F_j' F_j)^-1

@@ -10,7 +10,8 @@ use crate::Error;
 use crate::figures::short;
 use crate::model::{Map, Membership, NonlinearArxModel};
 
-/// What is added to the squares of a local regression, in parts of their mean: splits are compared by it, models are not solved by it.
+/// What is added to the squares of a local regression, in parts of their mean: splits are compared by it, models are
+/// not solved by it.
 const SMALL: f64 = 1e-10;
 
 /// How local models are grown.
@@ -39,7 +40,8 @@ struct Own {
     says: Vec<f64>,
 }
 
-/// What is known at each sample: z, y, and of all local models the sum of the memberships and of what they say, weighted by these.
+/// What is known at each sample: z, y, and of all local models the sum of the memberships and of what they say,
+/// weighted by these.
 struct Field<'d> {
     growth: Growth,
     domain: &'d [[f64; 2]],
@@ -132,9 +134,10 @@ impl Field<'_> {
 }
 
 impl Samples<'_> {
-    /// Local models by LOLIMOT: that which answers for the largest part of the squared errors is cut in half, along the regressor where
-    /// this leaves least, and so on (Nelles and Isermann 1996; Nelles, Nonlinear System Identification, 2001, section 13.3.1). Splits are
-    /// compared by weighted regressions of the two new models alone; each model on the way is then solved for all of its parameters.
+    /// Local models by LOLIMOT: that which answers for the largest part of the squared errors is cut in half, along the
+    /// regressor where this leaves least, and so on (Nelles and Isermann 1996; Nelles, Nonlinear System Identification,
+    /// 2001, section 13.3.1). Splits are compared by weighted regressions of the two new models alone; each model on
+    /// the way is then solved for all of its parameters.
     ///
     /// # Errors
     /// [`Error::Undetermined`] where a regressor is constant, or samples allow fewer local models than are asked for.

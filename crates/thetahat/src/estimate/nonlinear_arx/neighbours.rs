@@ -28,9 +28,9 @@ impl Samples<'_> {
         self.model(map, parameters.collect())
     }
 
-    /// The mean square of the errors one step ahead on blocks, each by the samples of the others, in units of the output; none where
-    /// these are too few. Samples that are next in time are near to one another: what they say of each other is not what they say of a
-    /// fresh log (Burman, Chow and Nolan, Biometrika 81, 1994).
+    /// The mean square of the errors one step ahead on blocks, each by the samples of the others, in units of the
+    /// output; none where these are too few. Samples that are next in time are near to one another: what they say of
+    /// each other is not what they say of a fresh log (Burman, Chow and Nolan, Biometrika 81, 1994).
     fn blocks_mse(&self, asked: usize, planes: bool) -> Option<f64> {
         let (mut squares, mut count) = (0.0, 0_usize);
         for block in self.blocks() {
@@ -52,8 +52,8 @@ impl Samples<'_> {
     /// Keeps the samples, and chooses how many of them are asked, unless that is given.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a number that the samples do not have, or a criterion that counts parameters; [`Error::Undetermined`] for
-    /// too few samples to hold some of them out.
+    /// [`Error::Argument`] for a number that the samples do not have, or a criterion that counts parameters;
+    /// [`Error::Undetermined`] for too few samples to hold some of them out.
     pub(crate) fn keep(
         &self,
         planes: bool,

@@ -2,8 +2,8 @@
 
 use crate::model::Map;
 
-/// `units` bends of each regressor, with knots that divide its range evenly and stand at both of its ends; a regressor that does not
-/// change has none.
+/// `units` bends of each regressor, with knots that divide its range evenly and stand at both of its ends; a regressor
+/// that does not change has none.
 pub(crate) fn map(ranges: &[[f64; 2]], units: usize) -> Map {
     let (mut regressors, mut knots) = (Vec::new(), Vec::new());
     for (regressor, [low, high]) in ranges.iter().enumerate() {

@@ -7,15 +7,16 @@ use super::{Count, Solved, TermStep, TermsOutcome, check, is_dependent, too_few}
 use crate::Error;
 use crate::model::{Map, NonlinearArxModel, OutputMap, Parameter};
 
-/// The least-squares solution of products of the regressors of `head`, a model of one output but its functions, from sums of deviations in
-/// the signals' own units; and how the products were chosen among `candidates`: of `most` steps as many as `count` says.
+/// The least-squares solution of products of the regressors of `head`, a model of one output but its functions, from
+/// sums of deviations in the signals' own units; and how the products were chosen among `candidates`: of `most` steps
+/// as many as `count` says.
 ///
-/// The model's regressors and its output are divided by their scales: a parameter is one of the signals as they are, times the scales of
-/// its factors, over that of the output.
+/// The model's regressors and its output are divided by their scales: a parameter is one of the signals as they are,
+/// times the scales of its factors, over that of the output.
 ///
 /// # Errors
-/// [`Error::Undetermined`] if there are not more samples than products, these depend on one another, or fewer than asked for can be told
-/// apart; [`Error::Data`] if sums leave the range of numbers.
+/// [`Error::Undetermined`] if there are not more samples than products, these depend on one another, or fewer than
+/// asked for can be told apart; [`Error::Data`] if sums leave the range of numbers.
 pub(crate) fn of_sums(
     head: &NonlinearArxModel,
     (candidates, most, count): (&Candidates, usize, &Count),

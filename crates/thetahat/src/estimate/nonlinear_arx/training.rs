@@ -47,8 +47,9 @@ struct Trained {
 }
 
 impl Samples<'_> {
-    /// Trains functions of which the numbers are free: as many of them, and with the ridge, as `count` says. Of all starts that with the
-    /// least cost is kept. Where `chosen_on` has other samples, these are compared there, and the chosen one is trained on all.
+    /// Trains functions of which the numbers are free: as many of them, and with the ridge, as `count` says. Of all
+    /// starts that with the least cost is kept. Where `chosen_on` has other samples, these are compared there, and the
+    /// chosen one is trained on all.
     ///
     /// # Errors
     /// [`Error::Undetermined`] for too few samples, or where no start leads anywhere;
@@ -146,12 +147,13 @@ impl Samples<'_> {
         ))
     }
 
-    /// Trains from one start: one step ahead, then over windows where samples are many, then over runs of the horizon. None where no
-    /// run from there keeps within bounds.
+    /// Trains from one start: one step ahead, then over windows where samples are many, then over runs of the horizon.
+    /// None where no run from there keeps within bounds.
     ///
-    /// The parameters of the map are solved for at the start alone, and searched for with the others then. To solve for them after each
-    /// step of the first stage, too (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), took fewer steps and more time: as many starts came
-    /// to the same optimum of the cascaded tanks, 3 to 34 % later with 2 to 8 units, and of 65,000 samples 76 % later.
+    /// The parameters of the map are solved for at the start alone, and searched for with the others then. To solve for
+    /// them after each step of the first stage, too (Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), took fewer
+    /// steps and more time: as many starts came to the same optimum of the cascaded tanks, 3 to 34 % later with 2 to 8
+    /// units, and of 65,000 samples 76 % later.
     fn train_from(
         &self,
         map: Map,

@@ -80,8 +80,8 @@ impl Beside {
         [&parameters[..places.start], &parameters[places.end..]].concat()
     }
 
-    /// The covariance of all parameters, and what they would change, as those of a line l(t) = level + slope (t - t_m) beside which
-    /// nothing is left:
+    /// The covariance of all parameters, and what they would change, as those of a line l(t) = level + slope (t - t_m)
+    /// beside which nothing is left:
     ///
     /// ```text
     /// d kappa = dk - sum_i da_i (level - slope i T),   d mu = dm/h - slope sum_i da_i

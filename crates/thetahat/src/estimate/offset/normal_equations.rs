@@ -1,7 +1,7 @@
 //! Estimates with and without a constant from normal equations alone, in twice the precision: the rows are gone.
 //!
-//! A column of ones is among those whose products were summed, so that the constant, what it is worth, and what is open of an offset
-//! that was taken before follow as they do from a record.
+//! A column of ones is among those whose products were summed, so that the constant, what it is worth, and what is open
+//! of an offset that was taken before follow as they do from a record.
 
 use thetahat_numerics::regression::{Column, ExtendedGram};
 
@@ -53,7 +53,8 @@ impl LinearProblem<'_> {
         }
     }
 
-    /// What an estimate without a constant leaves open of the offset that was taken: see [`Task::left_open`](super::Task::left_open).
+    /// What an estimate without a constant leaves open of the offset that was taken: see
+    /// [`Task::left_open`](super::Task::left_open).
     pub(crate) fn left_open(&self, without: &Estimate) -> Option<OffsetCovariance> {
         if without.noise_variance() <= 0.0 {
             return None;

@@ -10,11 +10,12 @@ use super::super::{Estimate, Initial, Norm, arx};
 use crate::data::Record;
 use crate::model::Orders;
 
-/// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant already.
+/// Of a column of ones less than this fraction of its square is left beside the regressors: they hold a constant
+/// already.
 const DEPENDENT: f64 = 1e-9;
 
-/// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their autoregression.
-/// None where they cannot be computed.
+/// var e/S(0), at most 1: the variance of the errors over their spectral density at frequency zero, by their
+/// autoregression. None where they cannot be computed.
 pub(super) fn white_samples(data: &impl ExperimentData, orders: &Orders, estimate: &Estimate) -> Option<f64> {
     let mut predictor = predictor_of(data, orders, estimate);
     best_free(&mut predictor, estimate.parameters()).ok()?;
@@ -22,9 +23,9 @@ pub(super) fn white_samples(data: &impl ExperimentData, orders: &Orders, estimat
     Some(1.0 / predictor.autoregression(taken)?.at_zero().max(1.0))
 }
 
-/// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the likelihood of
-/// Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform one. `share` of the
-/// samples counts.
+/// Whether the errors become smaller by what one parameter and further initial conditions cost: MDL, with the
+/// likelihood of Gaussian errors; where other norms were made small, of errors with Laplace's distribution or a uniform
+/// one. `share` of the samples counts.
 pub(super) fn is_worth(without: &Estimate, with: &Estimate, share: f64) -> bool {
     let samples = with.samples() as f64;
     let conditions = |estimate: &Estimate| estimate.procedure().initial_conditions() as f64;
@@ -50,7 +51,8 @@ pub(super) fn lowers_mdl(record: &Record<'_>, orders: &Orders, without: &Estimat
     cost > 0.0 && samples * (cost / left).ln() > samples.ln()
 }
 
-/// What a constant beside the parameters of a linear model does, exactly: with z = 1 it lowers the sum of squared errors by
+/// What a constant beside the parameters of a linear model does, exactly: with z = 1 it lowers the sum of squared
+/// errors by
 ///
 /// ```text
 /// (z'e)^2 / (z'z - z'Phi (Phi'Phi)^-1 Phi'z),
@@ -78,7 +80,8 @@ impl OfConstant {
         (left > DEPENDENT * samples).then_some(Self { errors, left, taken })
     }
 
-    /// The covariance of the parameters and of the constant after them, both being estimated, and the step that leads there.
+    /// The covariance of the parameters and of the constant after them, both being estimated, and the step that leads
+    /// there.
     pub(super) fn joint(&self, estimate: &Estimate) -> (Vec<Vec<f64>>, Vec<f64>) {
         // By the constant, 1.
         let along: Vec<f64> = self.taken.iter().map(|taken| -taken).chain([1.0]).collect();

@@ -1,7 +1,8 @@
 //! Several inputs through one denominator: y = (sum_j B_j u_j)/A + v, sum v^2 least.
 //!
-//! These are the errors of y = sum_j B_j/F_j u_j + v with all F_j the same, so psi' psi and psi' e of A and B are sums of entries
-//! of theirs: with theta = S (a, b) they are S'GS and S'g. All initial-condition responses are those of 1/A; one input has them.
+//! These are the errors of y = sum_j B_j/F_j u_j + v with all F_j the same, so psi' psi and psi' e of A and B are sums
+//! of entries of theirs: with theta = S (a, b) they are S'GS and S'g. All initial-condition responses are those of 1/A;
+//! one input has them.
 
 use std::ops::Range;
 
@@ -284,7 +285,8 @@ struct Reached<'r> {
     begin: InitialCondition,
 }
 
-/// A and B by name: initial parameters that were given, and those of least squares, of instrumental variables and of noise with a numerator.
+/// A and B by name: initial parameters that were given, and those of least squares, of instrumental variables and of
+/// noise with a numerator.
 fn starts(
     record: &Record<'_>,
     orders: &Orders,

@@ -1,8 +1,9 @@
 //! Starts from the optima of nested models, so that a larger model does not fit worse than a smaller one.
 //!
-//! The parameters of a smaller model, padded with zeros, have the same cost in a larger one, and a search never ends above
-//! the cost that it begins from. So where every model of a lattice begins from the best of those with one coefficient
-//! fewer in A, in every B, in C, in D or in every F, no model ends above any that is nested in it, by induction.
+//! The parameters of a smaller model, padded with zeros, have the same cost in a larger one, and a search never ends
+//! above the cost that it begins from. So where every model of a lattice begins from the best of those with one
+//! coefficient fewer in A, in every B, in C, in D or in every F, no model ends above any that is nested in it, by
+//! induction.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -84,8 +85,8 @@ impl Job<'_> {
         Ok(last.collect())
     }
 
-    /// The optima of the models with one coefficient fewer in A, every B or C, each from its own recipes, as parameters of
-    /// this model.
+    /// The optima of the models with one coefficient fewer in A, every B or C, each from its own recipes, as parameters
+    /// of this model.
     fn predecessors(&self, problem: Problem<'_, '_>) -> Result<Vec<Vec<f64>>, Error> {
         let Problem { record, orders, begin } = problem;
         let thin = thinned(record);
@@ -138,8 +139,8 @@ pub(super) fn is_long(record: &Record<'_>) -> bool {
     record.segments.iter().map(Range::len).sum::<usize>() > LONG
 }
 
-/// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for those
-/// with its plant; and for the smallest.
+/// Recipes are for models without A of which the plant is nearly that of the top, with all of its noise or none; for
+/// those with its plant; and for the smallest.
 fn has_recipes(at: &Levels, top: &Levels, bottom: &Levels) -> bool {
     let plant = at[1] == top[1] && at[4] == top[4];
     let close = at[1] + 1 >= top[1] && at[4] + 2 >= top[4];

@@ -1,9 +1,9 @@
 //! Where a search begins.
 //!
-//! The recipes of `start` lead to the same place where the plant is in the model set. Where they do not, the sum of squares
-//! has several minima or long valleys, and costs at the starts say little about where a search from them ends. Then optima
-//! of nested models are further starts (see `nested`), and all starts are compared after a few steps of Levenberg and
-//! Marquardt, the promising ones after some more.
+//! The recipes of `start` lead to the same place where the plant is in the model set. Where they do not, the sum of
+//! squares has several minima or long valleys, and costs at the starts say little about where a search from them ends.
+//! Then optima of nested models are further starts (see `nested`), and all starts are compared after a few steps of
+//! Levenberg and Marquardt, the promising ones after some more.
 
 use rayon::prelude::*;
 use thetahat_numerics::optimize::{
@@ -27,8 +27,8 @@ const DISAGREEMENT: f64 = 1e-3;
 const FAR: f64 = 1e-2;
 /// Starts of which the costs differ by less than this fraction are one.
 const SAME_COST: f64 = 1e-6;
-/// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest cost
-/// with which a start goes on.
+/// Rounds of a comparison: iterations of each start, and of what it reaches in them the largest ratio to the lowest
+/// cost with which a start goes on.
 const ROUNDS: [(usize, f64); 2] = [(4, 1.2), (10, 1.05)];
 /// The same where there is no F: iterations are cheap, and starts are few.
 const LONG_ROUND: [(usize, f64); 1] = [(100, 1.0)];
@@ -55,7 +55,8 @@ pub(super) struct Start {
 }
 
 impl Job<'_> {
-    /// The starts, the best first. If more than one is asked for, searches from this many and takes what the best search found.
+    /// The starts, the best first. If more than one is asked for, searches from this many and takes what the best
+    /// search found.
     pub(super) fn ranked(
         &self,
         problem: Problem<'_, '_>,
@@ -166,8 +167,8 @@ impl Job<'_> {
         Ok(nested.into_iter().map(|parameters| Start::new(NESTED, parameters, predictor)).collect())
     }
 
-    /// The best start from nested models after some iterations, if they lead below what was found. On a longer record only those
-    /// do that lead below on segments of it.
+    /// The best start from nested models after some iterations, if they lead below what was found. On a longer record
+    /// only those do that lead below on segments of it.
     pub(super) fn nested_below(
         &self,
         problem: Problem<'_, '_>,
@@ -194,8 +195,8 @@ impl Job<'_> {
         Ok(starts.into_iter().next().filter(|start| start.cost < lowest))
     }
 
-    /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them by
-    /// what they reach.
+    /// Follows the starts for a few iterations, and those that are close to the best of them for some more; sorts them
+    /// by what they reach.
     fn compare(
         &self,
         predictor: &mut impl PredictionErrors,
@@ -284,8 +285,8 @@ fn sort(starts: &mut [Start]) {
     starts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
 }
 
-/// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead is
-/// predicted by a step of Gauss and Newton, for a long record on segments of it.
+/// Whether searches from these sorted starts may end in different places, or far from where they begin: where they lead
+/// is predicted by a step of Gauss and Newton, for a long record on segments of it.
 fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut impl PredictionErrors) -> bool {
     let mut recipes: Vec<(&str, &Start)> = Vec::new();
     for start in starts.iter().filter(|start| start.cost.is_finite()) {
@@ -312,8 +313,8 @@ fn is_doubtful(problem: Problem<'_, '_>, starts: &[Start], predictor: &mut impl 
     }
 }
 
-/// Whether a search has converged and its errors are white. Of a long record these say that no other minimum is lower: there is
-/// nothing left to explain but what a few parameters take of the noise.
+/// Whether a search has converged and its errors are white. Of a long record these say that no other minimum is lower:
+/// there is nothing left to explain but what a few parameters take of the noise.
 fn leaves_white_errors(orders: &Orders, found: &Found, predictor: &impl PredictionErrors) -> bool {
     let taken = orders.parameters() + predictor.initial_conditions();
     let is_white = || predictor.autoregression(taken).is_some_and(|colour| colour.order() == 0);

@@ -11,8 +11,9 @@ fn add_scaled(target: &mut [f64], weight: f64, x: &[f64]) {
 }
 
 impl Predictor<'_> {
-    /// For each segment the columns of psi with respect to the parameters over the samples that count, the best changes of the
-    /// initial-condition responses taken out, at the current point. O(N p (n + 1)) for n initial-condition responses, and memory for N p numbers.
+    /// For each segment the columns of psi with respect to the parameters over the samples that count, the best changes
+    /// of the initial-condition responses taken out, at the current point. O(N p (n + 1)) for n initial-condition
+    /// responses, and memory for N p numbers.
     pub(in crate::estimate) fn columns(&self) -> Vec<Vec<Vec<f64>>> {
         self.sections.iter().map(|section| section.columns(&self.layouts[section.layout])).collect()
     }
@@ -56,7 +57,8 @@ impl Section<'_> {
         columns
     }
 
-    /// The columns of the parameters, then of the initial-condition responses, from the first sample that may count on; zero where one does not.
+    /// The columns of the parameters, then of the initial-condition responses, from the first sample that may count on;
+    /// zero where one does not.
     pub(super) fn raw_columns(&self, layout: &Layout) -> Vec<Vec<f64>> {
         let count = layout.parameters + layout.free;
         let rows = layout.counted..self.output.len();

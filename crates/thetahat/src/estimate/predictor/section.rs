@@ -51,13 +51,15 @@ pub(super) struct Section<'a> {
     /// The weights of the initial-condition responses, and those of a trial.
     pub(super) free: Vec<f64>,
     pub(super) trial: Vec<f64>,
-    /// The factor of the initial-condition responses' block, and the step to their optimum: for no change of parameters first, then for
-    /// each parameter.
+    /// The factor of the initial-condition responses' block, and the step to their optimum: for no change of parameters
+    /// first, then for each parameter.
     pub(super) free_factor: Vec<f64>,
     pub(super) free_steps: Vec<f64>,
-    /// For each initial-condition response, the sum of squares below which what D, C and the mask leave of it is rounding.
+    /// For each initial-condition response, the sum of squares below which what D, C and the mask leave of it is
+    /// rounding.
     pub(super) free_floors: Vec<f64>,
-    /// Initial-condition responses that begin before the samples that count, and how far each is known; what follows is nothing.
+    /// Initial-condition responses that begin before the samples that count, and how far each is known; what follows is
+    /// nothing.
     faded: Vec<f64>,
     faded_lengths: Vec<usize>,
     /// The response of 1/F_j to an impulse, for each input with such initial conditions.
@@ -80,7 +82,8 @@ impl<'a> Section<'a> {
         let used = |signal: usize| {
             signal == 0 || layout.taps.iter().any(|taps| taps.signal == signal && taps.count > 0)
         };
-        // Written when it is known what: a predictor may serve one question, and zeros first would be a tenth of its time.
+        // Written when it is known what: a predictor may serve one question, and zeros first would be a tenth of its
+        // time.
         let buffer = |used: bool| Vec::with_capacity(if used { length } else { 0 });
         let signal = |signal: usize| {
             // Behind an impulse response is nothing.
@@ -129,8 +132,8 @@ impl<'a> Section<'a> {
 
     /// The errors of polynomials with the trial weights that are best for them, and their sum of squares.
     ///
-    /// For initial-condition responses that begin before the samples that count: a small change of F changes a faded response many times
-    /// over, which no step of the weights to first order follows.
+    /// For initial-condition responses that begin before the samples that count: a small change of F changes a faded
+    /// response many times over, which no step of the weights to first order follows.
     pub(super) fn project(&mut self, layout: &Layout, polynomials: &Polynomials, negative: &[Vec<f64>]) {
         self.trial.fill(0.0);
         self.evaluate(layout, polynomials, negative);
@@ -325,8 +328,8 @@ impl<'a> Section<'a> {
         self.eliminate(layout);
     }
 
-    /// The response of (D/(C F_j)) to an impulse where initial-condition responses begin, or of 1/C to one at the first that counts, until it has
-    /// died away. Gives the sum of squares of what 1/F_j alone makes of it.
+    /// The response of (D/(C F_j)) to an impulse where initial-condition responses begin, or of 1/C to one at the first
+    /// that counts, until it has died away. Gives the sum of squares of what 1/F_j alone makes of it.
     fn respond(
         &mut self,
         layout: &Layout,

@@ -71,7 +71,8 @@ fn output(orders: &Orders, noise: &mut Noise) -> Vec<f64> {
     y
 }
 
-/// All errors that count, segment by segment, of parameters followed by the initial-condition responses' weights of each segment.
+/// All errors that count, segment by segment, of parameters followed by the initial-condition responses' weights of
+/// each segment.
 fn errors(predictor: &mut Predictor<'_>, unknowns: &[f64]) -> Vec<f64> {
     let (parameters, mut weights) = unknowns.split_at(predictor.right.len());
     for section in &mut predictor.sections {

@@ -8,8 +8,8 @@ use super::{Layout, Predictor};
 use crate::data::Record;
 
 impl Predictor<'_> {
-    /// Lets errors count linearly from a bound on: the cost is 2 sum rho(e), rho(e) = e^2/2 up to the bound d and
-    /// d |e| - d^2/2 beyond, and the normal equations have the weights min(1, d/|e|). None: by their squares all of them.
+    /// Lets errors count linearly from a bound on: the cost is 2 sum rho(e), rho(e) = e^2/2 up to the bound d and d
+    /// |e| - d^2/2 beyond, and the normal equations have the weights min(1, d/|e|). None: by their squares all of them.
     pub(in crate::estimate) fn count_linearly_from(&mut self, bound: Option<f64>) {
         for layout in &mut self.layouts {
             layout.bound = bound;

@@ -286,8 +286,8 @@ impl<'a> ProcessObjective<'a> {
         self.structures.iter().zip(&self.held_dead_times).map(of).collect()
     }
 
-    /// Between which dead times no change of an input passes a row that counts: where the output jumps with the input, those in between
-    /// leave the same errors.
+    /// Between which dead times no change of an input passes a row that counts: where the output jumps with the input,
+    /// those in between leave the same errors.
     pub(super) fn gap(&self, input: usize, dead_time: f64) -> [f64; 2] {
         let mut gap = [0.0, LONGEST_DEAD_TIME * self.longest];
         let mut next = self.rows.iter().peekable();
@@ -390,7 +390,8 @@ impl<'a> ProcessObjective<'a> {
         })
     }
 
-    /// Columns that `write` makes of the columns of an input and of the slopes of their sum by its shape and dead time, in a row.
+    /// Columns that `write` makes of the columns of an input and of the slopes of their sum by its shape and dead time,
+    /// in a row.
     fn slopes_of(
         &self,
         input: usize,
@@ -519,7 +520,8 @@ impl<'a> ProcessObjective<'a> {
         columns
     }
 
-    /// The fraction of the squared errors that a first state of each log would explain, where it stands; 0 where it has one.
+    /// The fraction of the squared errors that a first state of each log would explain, where it stands; 0 where it has
+    /// one.
     pub(super) fn explained_by_starts(&self) -> f64 {
         if self.background.free || self.is_of_points() {
             return 0.0;
@@ -533,8 +535,8 @@ impl<'a> ProcessObjective<'a> {
         1.0 - sum_of_squares(&left) / sum_of_squares(&self.residuals)
     }
 
-    /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero; the columns of
-    /// each stretch, and where it stands among the residuals.
+    /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero;
+    /// the columns of each stretch, and where it stands among the residuals.
     #[expect(clippy::type_complexity, reason = "three lists of one thing each")]
     pub(super) fn by_segments(
         &self,

@@ -4,21 +4,24 @@
 //! A(s) x = B(s) u,   y = x + e,   A(s) = s^n + a_(n-1) s^(n-1) + … + a_0
 //! ```
 //!
-//! Divided by the A of the last round, all derivatives are those of filtered signals, and the equation is linear in what is looked for:
+//! Divided by the A of the last round, all derivatives are those of filtered signals, and the equation is linear in
+//! what is looked for:
 //!
 //! ```text
 //! y_n = -sum a_k y_k + sum b_k u_k + level + slope t + v,   y_k = s^k/A(s) y,   u_k = s^k/A(s) u
 //! ```
 //!
-//! Its errors v are no noise that least squares could forget, so the instruments are the same signals of a free run of the last round. At
-//! the end, sum of the instruments times the errors is zero, which is the condition for the least output error (Young and Jakeman, Refined
-//! instrumental variable methods of recursive time-series analysis, part III, Int. J. Control 31, 1980; Garnier and Wang, eds.,
-//! Identification of Continuous-time Models from Sampled Data, 2008, section 4.5). The first round divides by (s + rate)^n for several
-//! rates, and its instruments are the signals themselves.
+//! Its errors v are no noise that least squares could forget, so the instruments are the same signals of a free run of
+//! the last round. At the end, sum of the instruments times the errors is zero, which is the condition for the least
+//! output error (Young and Jakeman, Refined instrumental variable methods of recursive time-series analysis, part III,
+//! Int. J. Control 31, 1980; Garnier and Wang, eds., Identification of Continuous-time Models from Sampled Data, 2008,
+//! section 4.5). The first round divides by (s + rate)^n for several rates, and its instruments are the signals
+//! themselves.
 //!
-//! Inputs are held from row to row and the filters see that exactly; outputs move along straight lines. Of a measured frequency response
-//! the filtered output is (j omega)^k/A(j omega) times each point, which makes the rounds those of Sanathanan and Koerner (IEEE Trans.
-//! Automatic Control 8, 1963) with instruments. Several inputs are fitted to what the others leave, in turn.
+//! Inputs are held from row to row and the filters see that exactly; outputs move along straight lines. Of a measured
+//! frequency response the filtered output is (j omega)^k/A(j omega) times each point, which makes the rounds those of
+//! Sanathanan and Koerner (IEEE Trans. Automatic Control 8, 1963) with instruments. Several inputs are fitted to what
+//! the others leave, in turn.
 
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 use thetahat_numerics::optimize::Deadline;

@@ -176,9 +176,10 @@ fn from_best(
     })
 }
 
-/// Where the output jumps with the input, so do the errors, as a function of the dead time, whenever a jump passes a sample: slopes do
-/// not lead from one minimum to the next. So the dead time is held at many values, and at some nearer to the best of them, the others
-/// being searched for. Between two such samples the errors of one lag do not depend on it at all; it is put in the middle.
+/// Where the output jumps with the input, so do the errors, as a function of the dead time, whenever a jump passes a
+/// sample: slopes do not lead from one minimum to the next. So the dead time is held at many values, and at some nearer
+/// to the best of them, the others being searched for. Between two such samples the errors of one lag do not depend on
+/// it at all; it is put in the middle.
 fn past_jumps(
     objective: &mut ProcessObjective<'_>,
     found: Found,

@@ -77,7 +77,8 @@ impl Form {
         DVector::from_iterator(a.len() + b.len() + h.len() + d.len() + levels.len(), all.copied())
     }
 
-    /// The root mean squares of the states along a record; 1 for a state that stays at zero. None if the form has no errors there.
+    /// The root mean squares of the states along a record; 1 for a state that stays at zero. None if the form has no
+    /// errors there.
     pub(super) fn state_sizes(&self, record: &JointRecord<'_>, refine: Refine) -> Option<Vec<f64>> {
         let none = DMatrix::zeros(self.flat().len(), 0);
         let floor = DMatrix::identity(self.h.nrows(), self.h.nrows());
@@ -145,9 +146,9 @@ pub(super) struct Unstable;
 
 /// N ln det cov e of the errors of a form, with its directions as parameters: J of [`Objective`].
 ///
-/// With R = cov e and psi = -de/dtheta, G = sum psi' R^-1 psi and g = sum psi' R^-1 e (Ljung, System Identification, 2nd ed. 1999, sections
-/// 7.4 and 10.2). The state that each segment starts from is, for any parameters, the one that leaves the least errors; it is taken out of the
-/// normal equations.
+/// With R = cov e and psi = -de/dtheta, G = sum psi' R^-1 psi and g = sum psi' R^-1 e (Ljung, System Identification,
+/// 2nd ed. 1999, sections 7.4 and 10.2). The state that each segment starts from is, for any parameters, the one that
+/// leaves the least errors; it is taken out of the normal equations.
 pub(super) struct Errors<'r> {
     record: &'r JointRecord<'r>,
     signals: Vec<&'r [f64]>,
@@ -235,8 +236,8 @@ impl<'r> Errors<'r> {
         }
     }
 
-    /// How the rows of [A; R^-1/2 H] and the entries of B, D and c move with each direction: for each of these n + l rows, by states, signals
-    /// and one.
+    /// How the rows of [A; R^-1/2 H] and the entries of B, D and c move with each direction: for each of these n + l
+    /// rows, by states, signals and one.
     fn sources(&self, root: &DMatrix<f64>) -> DMatrix<f64> {
         let (n, l) = (self.current.a.nrows(), self.current.h.nrows());
         let (q, m) = (self.current.b.ncols(), self.current.d.ncols());
@@ -318,16 +319,16 @@ impl<'r> Errors<'r> {
         Ok(())
     }
 
-    /// The covariance of g where the errors v are coloured, those of a free run of a model with noise. With w = R^-1 psi, v's covariance
-    /// Gamma_0 and Gamma_k = H F^(k-1) N,
+    /// The covariance of g where the errors v are coloured, those of a free run of a model with noise. With w = R^-1
+    /// psi, v's covariance Gamma_0 and Gamma_k = H F^(k-1) N,
     ///
     /// ```text
     /// cov g = sum_t w_t' Gamma_0 w_t + w_t' H xi_t + (w_t' H xi_t)',   xi_(t+1) = F xi_t + N w_t
     /// P = F P F' + K Re K',   Gamma_0 = H P H' + Re,   N = F P H' + K Re
     /// ```
     ///
-    /// (Ljung, System Identification, 2nd ed. 1999, section 9.4, for weights of a filter). None where P has no solution. The starts of segments
-    /// count as known.
+    /// (Ljung, System Identification, 2nd ed. 1999, section 9.4, for weights of a filter). None where P has no
+    /// solution. The starts of segments count as known.
     pub(super) fn covariance_of_right(&self, noise: &StateSpace) -> Option<Vec<f64>> {
         let StateSpace { f, h, k, noise_covariance, .. } = noise;
         let (n, l, size) = (f.nrows(), h.nrows(), self.basis.ncols());
@@ -370,8 +371,8 @@ impl<'r> Errors<'r> {
     }
 }
 
-/// P of P = F P F' + Q by doubling: P_(i+1) = P_i + A_i P_i A_i', A_(i+1) = A_i^2 (Smith, SIAM J. Applied Mathematics 16, 1968). None where F is
-/// not stable.
+/// P of P = F P F' + Q by doubling: P_(i+1) = P_i + A_i P_i A_i', A_(i+1) = A_i^2 (Smith, SIAM J. Applied Mathematics
+/// 16, 1968). None where F is not stable.
 fn state_covariance(f: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let (mut power, mut sum) = (f.clone(), noise.clone());
     for _ in 0..DOUBLINGS {
@@ -459,8 +460,8 @@ impl Objective for Errors<'_> {
     }
 }
 
-/// What is seen along a record: R^-1/2 psi and R^-1/2 e of some rows, those of an output of a row standing together, with the recursion's
-/// [A; R^-1/2 H]; or the end of a segment.
+/// What is seen along a record: R^-1/2 psi and R^-1/2 e of some rows, those of an output of a row standing together,
+/// with the recursion's [A; R^-1/2 H]; or the end of a segment.
 pub(super) enum Seen<'s> {
     Rows { through: &'s DMatrix<f64>, slopes: &'s [f64], errors: &'s [f64] },
     End,

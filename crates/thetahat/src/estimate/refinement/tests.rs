@@ -6,7 +6,8 @@ use super::*;
 use crate::estimate::subspace::tests::{Run, distance, plant};
 use crate::estimate::{SubspaceOptions, Weighting, subspace};
 
-/// A record of the plant in two segments, a start from a subspace method with levels that are off, and what is looked for.
+/// A record of the plant in two segments, a start from a subspace method with levels that are off, and what is looked
+/// for.
 fn start(record: &JointRecord<'_>, weighting: Weighting) -> Result<RefinementStart, Error> {
     let options = SubspaceOptions { weighting, feedthrough: Some(true), ..SubspaceOptions::default() };
     let model = subspace(record, &options)?.state_space(4, 1.0)?;

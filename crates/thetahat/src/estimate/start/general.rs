@@ -1,4 +1,5 @@
-//! Models with A and F: A y = sum_j B_j/F_j u_j + C/D e. The plant's poles are those of A and F, the noise's those of A and D.
+//! Models with A and F: A y = sum_j B_j/F_j u_j + C/D e. The plant's poles are those of A and F, the noise's those of A
+//! and D.
 
 use thetahat_core::nalgebra::ComplexField;
 
@@ -18,8 +19,8 @@ const SPLITS: usize = 12;
 const MOST_PARTS: usize = 12;
 
 impl Data<'_> {
-    /// Starts with an A that is a factor of the plant's denominator; with A and F in turn; with an A that is taken from the
-    /// noise; with F = 1; and with A = 1.
+    /// Starts with an A that is a factor of the plant's denominator; with A and F in turn; with an A that is taken from
+    /// the noise; with F = 1; and with A = 1.
     pub(super) fn general(&self) -> Vec<Candidate> {
         let orders = self.orders;
         let mut candidates = Vec::new();
@@ -53,7 +54,8 @@ impl Data<'_> {
         candidates
     }
 
-    /// Splits the denominator A F of y = B/(A F) u + v, for one input: the A of which the noise A v = C/D e is the smallest.
+    /// Splits the denominator A F of y = B/(A F) u + v, for one input: the A of which the noise A v = C/D e is the
+    /// smallest.
     fn with_plant_poles(&self) -> Option<Candidate> {
         let orders = self.orders;
         let [nf] = orders.nf[..] else { return None };
@@ -80,8 +82,8 @@ impl Data<'_> {
         Some(found.candidate("plant-poles", start.unstable_pole))
     }
 
-    /// F of an output-error model; then in turn A, B, C and D by generalised least squares on y and u/F, and F by refined
-    /// instrumental variables on A y and u, both filtered by D/C.
+    /// F of an output-error model; then in turn A, B, C and D by generalised least squares on y and u/F, and F by
+    /// refined instrumental variables on A y and u, both filtered by D/C.
     fn in_turn(&self, first: &Start, without_a: &Orders) -> Option<Candidate> {
         let orders = self.orders;
         let mut start = first.clone();

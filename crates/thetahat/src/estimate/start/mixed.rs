@@ -139,8 +139,8 @@ impl<'a> Data<'a> {
         candidates
     }
 
-    /// A y = B u + C/D e by A and B that are consistent in noise of any colour, each improved by generalised least squares:
-    /// C and D from w = A y - B u, then A and B by least squares on y and u filtered by D/C (Clarke 1967).
+    /// A y = B u + C/D e by A and B that are consistent in noise of any colour, each improved by generalised least
+    /// squares: C and D from w = A y - B u, then A and B by least squares on y and u filtered by D/C (Clarke 1967).
     fn ararmax(&self) -> Vec<Candidate> {
         let equation = self.equation();
         let orders = self.orders;
@@ -277,7 +277,8 @@ impl<'a> Data<'a> {
         OutputError::new(self.output, self.inputs, self.segments, self.orders, self.deadline)
     }
 
-    /// The noise model of what a plant leaves, where there is no A; none where that is rounding, or white by the orders.
+    /// The noise model of what a plant leaves, where there is no A; none where that is rounding, or white by the
+    /// orders.
     pub(super) fn noise_behind(&self, start: &Start) -> Option<Mixed> {
         if self.orders.nc + self.orders.nd == 0 {
             return None;

@@ -3,9 +3,9 @@
 //! 1. Steiglitz and McBride's iteration on y; 2. the same from a low-pass filter, for plants that are sampled fast;
 //! 3. the same on what a long ARX model makes of the inputs without noise; 4. refined instrumental variables from each.
 //!
-//! Of every iteration the iterate of the lowest cost is kept. Where inputs have denominators of their own, the first two
-//! take one denominator for all of them; their parts x_j, and those of the long model, each give F_j, and the last step is
-//! for all of them together.
+//! Of every iteration the iterate of the lowest cost is kept. Where inputs have denominators of their own, the first
+//! two take one denominator for all of them; their parts x_j, and those of the long model, each give F_j, and the last
+//! step is for all of them together.
 
 use std::ops::Range;
 
@@ -23,8 +23,8 @@ const LONG: usize = 50;
 /// With more segments their initial conditions are not solved for.
 const MOST_SEGMENTS: usize = 1000;
 
-/// The n poles that the second iteration begins from: they hide noise at high frequencies from it. In 30 of 30 records of a
-/// plant with some 300 and 1200 samples in a period it led to the least cost, where the first did in 11.
+/// The n poles that the second iteration begins from: they hide noise at high frequencies from it. In 30 of 30 records
+/// of a plant with some 300 and 1200 samples in a period it led to the least cost, where the first did in 11.
 const LOW_PASS: f64 = 0.95;
 /// Starts of which the costs differ by less than this fraction are one.
 const SAME_COST: f64 = 1e-9;

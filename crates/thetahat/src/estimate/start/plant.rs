@@ -16,8 +16,8 @@
 //! have the same fixed points as the equations for theta itself, and are exact where these lose digits.
 //!
 //! Sources: Steiglitz and McBride, A technique for the identification of linear systems, IEEE Trans. Automatic Control
-//! 10, 1965; Young, Some observations on instrumental variable methods of time-series analysis, Int. J. Control 23, 1976;
-//! Young, Recursive Estimation and Time-Series Analysis, 2nd ed. 2011, chapters 6 and 7.
+//! 10, 1965; Young, Some observations on instrumental variable methods of time-series analysis, Int. J. Control 23,
+//! 1976; Young, Recursive Estimation and Time-Series Analysis, 2nd ed. 2011, chapters 6 and 7.
 
 use std::ops::Range;
 
@@ -128,9 +128,9 @@ impl<'a> Plant<'a> {
         self.groups.iter().map(unit).collect()
     }
 
-    /// Iterates from some denominators, reflecting unstable roots, and keeps those of the lowest cost: on `target` where
-    /// there is one, else on the plant's own output. O(N p) for each iteration, of which none begins after the deadline.
-    /// None if no cost is a number.
+    /// Iterates from some denominators, reflecting unstable roots, and keeps those of the lowest cost: on `target`
+    /// where there is one, else on the plant's own output. O(N p) for each iteration, of which none begins after the
+    /// deadline. None if no cost is a number.
     pub(in crate::estimate) fn iterate(
         &self,
         start: &[Vec<f64>],
@@ -182,7 +182,8 @@ impl<'p, 'a> Point<'p, 'a> {
         }
     }
 
-    /// Solves for b and the initial conditions; gives the least sum of squares, for the output `target` if there is one.
+    /// Solves for b and the initial conditions; gives the least sum of squares, for the output `target` if there is
+    /// one.
     pub(in crate::estimate) fn move_to(
         &mut self,
         denominators: &[Vec<f64>],

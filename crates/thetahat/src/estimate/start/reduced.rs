@@ -13,7 +13,8 @@ const DIED_AWAY: f64 = 1e-10;
 /// Samples of a response that are computed at once.
 const PIECE: usize = 128;
 
-/// L L' = G for a positive semidefinite G: a column that depends on those before it is left out, and its unknown is zero.
+/// L L' = G for a positive semidefinite G: a column that depends on those before it is left out, and its unknown is
+/// zero.
 #[derive(Debug, Clone)]
 pub(in crate::estimate) struct Factor {
     /// A column left out is zero from the diagonal down.
@@ -147,13 +148,15 @@ fn impulse_response(monic: &[f64], count: usize, longest: usize) -> Vec<f64> {
     response
 }
 
-/// Reduced equations for parameters that all segments share, the initial-condition responses of each segment being taken out:
+/// Reduced equations for parameters that all segments share, the initial-condition responses of each segment being
+/// taken out:
 ///
 /// ```text
 /// G = sum_s (G_s - K_s' H_s K_s),   g = sum_s (g_s - K_s' h_s),   K_s = H_s^-1 X_s,
 /// ```
 ///
-/// H_s and h_s belonging to the initial-condition responses of segment s alone, X_s to both. O(N p), and O(n^3) for each segment.
+/// H_s and h_s belonging to the initial-condition responses of segment s alone, X_s to both. O(N p), and O(n^3) for
+/// each segment.
 #[derive(Debug, Clone)]
 pub(in crate::estimate) struct Reduced {
     pub(in crate::estimate) matrix: DMatrix<f64>,
@@ -220,7 +223,8 @@ impl Reduced {
         self.taken.iter().map(of_segment).collect()
     }
 
-    /// What takes the initial-condition responses of a segment out of its columns: `[I, -K']` for columns followed by initial-condition responses.
+    /// What takes the initial-condition responses of a segment out of its columns: `[I, -K']` for columns followed by
+    /// initial-condition responses.
     pub(in crate::estimate) fn combination(&self, segment: usize) -> Option<DMatrix<f64>> {
         let taken = self.taken.get(segment)?;
         let (count, size) = taken.cross.shape();
@@ -231,8 +235,9 @@ impl Reduced {
         }))
     }
 
-    /// The triangular factor of the same columns, initial-condition responses taken out, as exact as Householder QR: good for condition
-    /// numbers of which the square is beyond rounding. 2 N p^2 flops. None if a sample is out of range.
+    /// The triangular factor of the same columns, initial-condition responses taken out, as exact as Householder QR:
+    /// good for condition numbers of which the square is beyond rounding. 2 N p^2 flops. None if a sample is out of
+    /// range.
     pub(in crate::estimate) fn factor(
         signals: &[&[f64]],
         taps: &[Taps],

@@ -15,8 +15,8 @@ pub(crate) trait SubspaceData {
     /// The samples that have so many before them in their segment.
     fn samples(&self, lags: usize) -> usize;
 
-    /// The mean products of z(t), …, z(t-longest), lag by lag, over these samples, and the means if products are to be those of deviations
-    /// from them.
+    /// The mean products of z(t), …, z(t-longest), lag by lag, over these samples, and the means if products are to be
+    /// those of deviations from them.
     fn mean_products(&self, longest: usize, centred: bool) -> (DMatrix<f64>, Option<DVector<f64>>);
 
     /// Why there are no products with such a past.

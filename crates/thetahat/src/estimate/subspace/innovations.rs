@@ -6,8 +6,8 @@ use crate::data::JointRecord;
 use crate::model::StateSpace;
 use crate::respond::state_space::Recursion;
 
-/// The sums of the products of the innovations of outputs from their levels, each segment from the state that leaves least of them. None
-/// where they leave the range of numbers. O(N (n + l) (n + m + l)).
+/// The sums of the products of the innovations of outputs from their levels, each segment from the state that leaves
+/// least of them. None where they leave the range of numbers. O(N (n + l) (n + m + l)).
 pub(crate) fn products(model: &StateSpace, record: &JointRecord<'_>, levels: &[f64]) -> Option<DMatrix<f64>> {
     let outputs = record.outputs.len();
     let mut sums = vec![0.0; outputs * outputs];

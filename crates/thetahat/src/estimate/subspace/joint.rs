@@ -13,8 +13,8 @@ pub(crate) fn joint_taps(delays: &[usize], outputs: usize, longest: usize) -> Ve
     firsts.enumerate().map(|(signal, first)| Taps { signal, first, count: longest + 1, sign: 1.0 }).collect()
 }
 
-/// The sums of the products of these, for models that are solved without the record: `segments` have a regressor's lags before their
-/// first sample that counts.
+/// The sums of the products of these, for models that are solved without the record: `segments` have a regressor's lags
+/// before their first sample that counts.
 pub(crate) fn joint_products(
     signals: &[&[f64]],
     taps: Vec<Taps>,

@@ -12,9 +12,9 @@ pub(in crate::estimate) const ROUNDING: f64 = 1e-13;
 
 /// y(t) = D u(t) + M_1 z(t-1) + … + M_p z(t-p) + e(t) with z = [u; y]: m inputs, l outputs, q = m + l.
 ///
-/// The lagged products of all signals, each divided by its root mean square, are the normal equations of this regression for every p. A
-/// Cholesky factor of them, with y(t) last, holds the sums of squares of all these p at once: what the columns beyond those of p and the
-/// diagonal block leave of y.
+/// The lagged products of all signals, each divided by its root mean square, are the normal equations of this
+/// regression for every p. A Cholesky factor of them, with y(t) last, holds the sums of squares of all these p at once:
+/// what the columns beyond those of p and the diagonal block leave of y.
 #[derive(Debug)]
 pub(in crate::estimate) struct LaggedProducts {
     pub(in crate::estimate) inputs: usize,
@@ -23,8 +23,8 @@ pub(in crate::estimate) struct LaggedProducts {
     pub(super) past: usize,
     /// The samples that the products are sums of.
     pub(in crate::estimate) samples: usize,
-    /// The products of z(t), …, z(t-p), lag by lag, over the number of samples; with a constant in the regression those of the deviations
-    /// from their means.
+    /// The products of z(t), …, z(t-p), lag by lag, over the number of samples; with a constant in the regression those
+    /// of the deviations from their means.
     pub(in crate::estimate) products: DMatrix<f64>,
     /// These means, where there is a constant.
     pub(in crate::estimate) means: Option<DVector<f64>>,
@@ -168,8 +168,8 @@ impl LaggedProducts {
         all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(1, |(past, _)| past)
     }
 
-    /// Whether u(t) is worth its m l parameters of y(t) by MDL, and past outputs say nothing of u(t): where they do, the inputs are fed
-    /// back, and u(t) may tell of y(t) because it depends on it.
+    /// Whether u(t) is worth its m l parameters of y(t) by MDL, and past outputs say nothing of u(t): where they do,
+    /// the inputs are fed back, and u(t) may tell of y(t) because it depends on it.
     pub(super) fn has_feedthrough(&self) -> bool {
         let (u, y) = self.now();
         let before = self.lags(self.past).len();
@@ -187,7 +187,8 @@ impl LaggedProducts {
         samples * fall > parameters as f64 * samples.ln()
     }
 
-    /// Whether past outputs tell of the inputs what past inputs do not (Granger, Econometrica 37, 1969), with any number of lags.
+    /// Whether past outputs tell of the inputs what past inputs do not (Granger, Econometrica 37, 1969), with any
+    /// number of lags.
     fn is_fed_back(&self) -> bool {
         let is_input = |place: &usize| place % self.width() < self.inputs;
         (1..=self.past).any(|past| {

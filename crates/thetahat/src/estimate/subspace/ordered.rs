@@ -19,7 +19,8 @@ pub(crate) struct Ordered {
 }
 
 impl Ordered {
-    /// The order of least MDL among some, or among those that are offered; with levels where these are asked for, or lower MDL.
+    /// The order of least MDL among some, or among those that are offered; with levels where these are asked for, or
+    /// lower MDL.
     ///
     /// # Errors
     /// As for [`subspace`](super::subspace) and [`Subspace::order`].

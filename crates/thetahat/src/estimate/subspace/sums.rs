@@ -103,19 +103,21 @@ impl SubspaceSums<'_> {
         lags + self.delays.iter().copied().max().unwrap_or(0)
     }
 
-    /// The lags of the errors: some more than those of the states, from which their predictor starts, if there are samples with them.
+    /// The lags of the errors: some more than those of the states, from which their predictor starts, if there are
+    /// samples with them.
     fn lags_of_errors(&self, past: usize) -> usize {
         longest_past(self, past.saturating_add(RUN)).map_or(past, |longest| longest.max(past))
     }
 
-    /// The errors one step ahead of a model of some order. The predictor starts at the states that as many samples say as the model was found
-    /// from, and runs over the lags that are left:
+    /// The errors one step ahead of a model of some order. The predictor starts at the states that as many samples say
+    /// as the model was found from, and runs over the lags that are left:
     ///
     /// ```text
     /// e(t) = y(t) - D u(t) - sum_j H A^(j-1) [G - K D, K] z(t-j) - H A^r x(t-r),   A = F - K H,   j = 1 … r,
     /// ```
     ///
-    /// a combination C of lagged signals, so that the mean of e e' is C times their products times C'. None for an order without a model.
+    /// a combination C of lagged signals, so that the mean of e e' is C times their products times C'. None for an
+    /// order without a model.
     pub(crate) fn errors(&self, found: &Subspace, order: usize) -> Option<SubspaceErrors> {
         let lags = self.lags_of_errors(found.past());
         let products = self.of(lags);

@@ -16,8 +16,9 @@ use crate::Error;
 
 /// What a subspace method takes the singular values of.
 ///
-/// SSARX is described at [`subspace`](super::subspace()). The classical methods regress s future outputs on the future inputs and on p
-/// samples of the past, z = [u; y]. With the lower Cholesky factor L of the products of these three, in this order,
+/// SSARX is described at [`subspace`](super::subspace()). The classical methods regress s future outputs on the future
+/// inputs and on p samples of the past, z = [u; y]. With the lower Cholesky factor L of the products of these three, in
+/// this order,
 ///
 /// ```text
 /// Y_f = (…) U_f + Theta Z_p + …,   Theta = L32 L22^-1
@@ -27,18 +28,19 @@ use crate::Error;
 /// cva:   (root of L32 L32' + L33 L33')^-1 L32     = W Theta R,   W^-1 W'^-1 = L32 L32' + L33 L33',  R = L22
 /// ```
 ///
-/// The sigma are the scales of the outputs, which L is without. The state of order n is x = S^½ V' R^-1 z_past with its first n rows, of
-/// W Theta R = U S V' (Van Overschee and De Moor, Subspace Identification for Linear Systems, 1996, chapter 4; MOESP: Verhaegen, Automatica
-/// 30, 1994; CVA: Larimore, American Control Conference 1983, and Conference on Decision and Control 1990). Without inputs there is no U_f.
+/// The sigma are the scales of the outputs, which L is without. The state of order n is x = S^½ V' R^-1 z_past with its
+/// first n rows, of W Theta R = U S V' (Van Overschee and De Moor, Subspace Identification for Linear Systems, 1996,
+/// chapter 4; MOESP: Verhaegen, Automatica 30, 1994; CVA: Larimore, American Control Conference 1983, and Conference on
+/// Decision and Control 1990). Without inputs there is no U_f.
 ///
-/// Where inputs are fed back, U_f tells of the noise, and the classical methods are biased: with N = 1000 samples of a plant of order 2
-/// in a loop, the median relative error of the impulse response of 100 runs was 0.10 for SSARX and CVA, 0.22 for N4SID and 0.23 for MOESP. In
-/// open loop all four are alike.
+/// Where inputs are fed back, U_f tells of the noise, and the classical methods are biased: with N = 1000 samples of a
+/// plant of order 2 in a loop, the median relative error of the impulse response of 100 runs was 0.10 for SSARX and
+/// CVA, 0.22 for N4SID and 0.23 for MOESP. In open loop all four are alike.
 ///
-/// F and H follow by least squares from the states for all of them. Those that the classical methods read off the rows of
-/// Gamma = W^-1 U S^½, F = Gamma_up^+ Gamma_down, predict no better: on the evaporator of DaISy (order 8, p = s = 26) MOESP has a mean fit of
-/// 78.5 % one step ahead and 74.1 % five steps ahead against 78.4 and 73.9 % with these; on its CD player arm, which moves in a loop, 90.4 and
-/// 82.4 % (order 20) against 12 % and none at all.
+/// F and H follow by least squares from the states for all of them. Those that the classical methods read off the rows
+/// of Gamma = W^-1 U S^½, F = Gamma_up^+ Gamma_down, predict no better: on the evaporator of DaISy (order 8, p = s =
+/// 26) MOESP has a mean fit of 78.5 % one step ahead and 74.1 % five steps ahead against 78.4 and 73.9 % with these; on
+/// its CD player arm, which moves in a loop, 90.4 and 82.4 % (order 20) against 12 % and none at all.
 ///
 /// ```
 /// use thetahat::data::JointRecord;
@@ -70,12 +72,13 @@ pub enum Weighting {
     /// What a long ARX model of several outputs predicts, in units of its errors: consistent where inputs are fed back.
     #[default]
     Ssarx,
-    /// What the past says of the outputs beyond the future inputs, in their units. These singular values, times the root of the number of
-    /// samples, are those that SLICOT's IB01AD prints.
+    /// What the past says of the outputs beyond the future inputs, in their units. These singular values, times the
+    /// root of the number of samples, are those that SLICOT's IB01AD prints.
     Moesp,
     /// What the past says of the outputs, without what the future inputs do, in their units.
     N4sid,
-    /// The canonical correlations of the past and the future beyond the future inputs: singular values from 0 to 1, whatever the units.
+    /// The canonical correlations of the past and the future beyond the future inputs: singular values from 0 to 1,
+    /// whatever the units.
     Cva,
 }
 
@@ -126,7 +129,8 @@ impl Weighting {
             }
             Self::Cva => {
                 let Projected { mut map, factor, covariance, .. } = Projected::new(data, regression, future);
-                // Outputs without noise have a singular covariance; what rounding leaves of it must not look like correlation.
+                // Outputs without noise have a singular covariance; what rounding leaves of it must not look like
+                // correlation.
                 let rounding = DMatrix::identity(map.nrows(), map.nrows()) * ROUNDING;
                 let left = Cholesky::new(covariance + rounding);
                 left.filter(|left| left.l_dirty().solve_lower_triangular_mut(&mut map))
@@ -183,7 +187,8 @@ impl Weighted {
     }
 }
 
-/// What a regression of the future outputs on the future inputs and the past leaves, all signals divided by their scales.
+/// What a regression of the future outputs on the future inputs and the past leaves, all signals divided by their
+/// scales.
 #[derive(Debug)]
 struct Projected {
     /// Theta.

@@ -1,10 +1,10 @@
 //! Errors that are not known, as outputs are missing, given those that are.
 //!
-//! With v = e/A the log-likelihood of a segment is -|A v|^2/(2 sigma^2), A being a lower triangular matrix with the monic
-//! polynomial in its columns. So the missing samples m have, given the others, the mean that makes |A v| least and the covariance
-//! sigma^2 (A'A)_mm^-1, and what is left of |A v|^2 is v'R^-1 v of the known ones (Jones, Technometrics 22 (1980); here by a banded
-//! Cholesky factor). What expectation and maximisation needs of the covariance are the entries within n samples of the diagonal:
-//! with (A'A)_mm = L L' and Z its inverse
+//! With v = e/A the log-likelihood of a segment is -|A v|^2/(2 sigma^2), A being a lower triangular matrix with the
+//! monic polynomial in its columns. So the missing samples m have, given the others, the mean that makes |A v| least
+//! and the covariance sigma^2 (A'A)_mm^-1, and what is left of |A v|^2 is v'R^-1 v of the known ones (Jones,
+//! Technometrics 22 (1980); here by a banded Cholesky factor). What expectation and maximisation needs of the
+//! covariance are the entries within n samples of the diagonal: with (A'A)_mm = L L' and Z its inverse
 //!
 //! ```text
 //! Z_jj = 1/L_jj^2 - sum_{k>j} L_kj Z_kj/L_jj,   Z_ij = -sum_{k>j} L_kj Z_ki/L_jj   for i > j

@@ -156,7 +156,8 @@ fn the_least_mdl_has_the_orders_of_the_plant() -> Result<(), Error> {
     Ok(())
 }
 
-/// A range of delays is searched on the products of the other models, and ends at the model of an input that was moved before.
+/// A range of delays is searched on the products of the other models, and ends at the model of an input that was moved
+/// before.
 #[test]
 fn the_least_mdl_has_the_delay_of_the_plant() -> Result<(), Error> {
     let mut signals = signals(2000, 0.5, [3.0, -2.0], 5);

@@ -1,13 +1,14 @@
-//! The extended Kalman filter of a model in equations (Jazwinski, Stochastic Processes and Filtering Theory, 1970, section 8.3):
+//! The extended Kalman filter of a model in equations (Jazwinski, Stochastic Processes and Filtering Theory, 1970,
+//! section 8.3):
 //!
 //! ```text
 //! S = H P H' + R_j,  K = P H'/S,  x <- x + K (y_j - h_j - H (x - x^-)),  P <- (I - K H) P (I - K H)' + K R_j K'      for each output
 //! x <- f(x, u),      P <- M P M' + Q
 //! ```
 //!
-//! around one linearisation a sample, with noises that are independent of one another, the last output first, as the filters of thetahat-core have
-//! it. The covariance is in the form of Bucy and Joseph (Filtering for
-//! Stochastic Processes, 1968), which rounding leaves positive.
+//! around one linearisation a sample, with noises that are independent of one another, the last output first, as the
+//! filters of thetahat-core have it. The covariance is in the form of Bucy and Joseph (Filtering for Stochastic
+//! Processes, 1968), which rounding leaves positive.
 
 use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
 use super::super::signals::{Innovations, PREDICTION, Signals};

@@ -16,7 +16,8 @@ pub(super) struct Leaves {
     pub(super) step: f64,
 }
 
-/// The statements that the first `count` results of a program need, and these results. What is used once stands where it is used.
+/// The statements that the first `count` results of a program need, and these results. What is used once stands where
+/// it is used.
 pub(super) fn translated(
     program: &mut Program,
     compiled: &Compiled,

@@ -93,7 +93,8 @@ fn an_observer_tells_the_innovations_of_the_filter() {
         let report = fit_state_space(&a_log(&y), &[], &plan).expect("a fit");
         let program = form(&report.model, Purpose::Observer).expect("a form").program;
         let observe = &program.entries[0];
-        // Until the end, where one output is missing: the filter then knows its state less well than a stationary gain says.
+        // Until the end, where one output is missing: the filter then knows its state less well than a stationary gain
+        // says.
         for missing in 0..outputs.len() {
             let model = StateModel::from_report(&report, Some(InitialState::Zero)).expect("a model");
             let mut filter = StateFilter::new(model, Estimator::Kalman).expect("a filter");

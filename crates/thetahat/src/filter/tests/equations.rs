@@ -242,7 +242,8 @@ fn steps_of_any_length_are_taken_by_equations_in_time() {
         time += step;
         assert!((estimate.predicted.values[0] - (-time).exp()).abs() < 1e-6);
     }
-    // Noise of variance 0.09 in 0.1 s is 0.9 a second; var = 0.45 (1 - exp(-2 t)), up to its being added at a step's end.
+    // Noise of variance 0.09 in 0.1 s is 0.9 a second; var = 0.45 (1 - exp(-2 t)), up to its being added at a step's
+    // end.
     let deviation =
         filter.step(Some(10.0), &[], &[f64::NAN]).unwrap().predicted.standard_deviations.unwrap()[0];
     assert!((deviation * deviation / 0.45 - 1.0).abs() < 0.11, "{deviation}");

@@ -111,7 +111,8 @@ fn its_slopes_are_differences() {
 
 #[test]
 fn outputs_that_are_missing_are_run_on_with_the_deviation_of_a_linear_filter() {
-    // Of a line the extended filter is the Kalman filter: the variance of an ARX model k steps ahead is s² sum of squares of 1/A.
+    // Of a line the extended filter is the Kalman filter: the variance of an ARX model k steps ahead is s² sum of
+    // squares of 1/A.
     let log = log();
     let report = fitted(MapPlan::Polynomial { degree: 1 }, &["y"], 1, None);
     let (u, y) = (values(&log, "u"), values(&log, "y"));

@@ -61,7 +61,8 @@ struct Level {
     runs: Vec<Rows>,
 }
 
-/// The times and values of rows, and their products about the means, in units of `scale`: see `regression::lagged_moments`.
+/// The times and values of rows, and their products about the means, in units of `scale`: see
+/// `regression::lagged_moments`.
 #[derive(Debug, Clone, Copy, Default)]
 struct Spread {
     count: f64,

@@ -4,16 +4,17 @@
 const WAITING: usize = 1 << 16;
 const FOR_EACH: usize = 4;
 
-/// The values of a signal and how often each is there: exact while they are few, else rounded to as many bits as there is room for.
+/// The values of a signal and how often each is there: exact while they are few, else rounded to as many bits as there
+/// is room for.
 ///
-/// A value is a whole number in the order of all numbers (IEEE 754, section 5.10). Where there are more than `most` of them, the last bit
-/// that is left is dropped, from all and for good: cells of 2^d numbers become cells of 2^(d+1). A cell is as wide as 2^(d - 52) of its
-/// values, so that a quantile is exact to half of that, in relative terms. Which bits are dropped depends on the values alone, not on
-/// their order or on the parts that they came in.
+/// A value is a whole number in the order of all numbers (IEEE 754, section 5.10). Where there are more than `most` of
+/// them, the last bit that is left is dropped, from all and for good: cells of 2^d numbers become cells of 2^(d+1). A
+/// cell is as wide as 2^(d - 52) of its values, so that a quantile is exact to half of that, in relative terms. Which
+/// bits are dropped depends on the values alone, not on their order or on the parts that they came in.
 ///
-/// Source: Epicoco et al., UDDSketch: accurate tracking of quantiles in data streams, IEEE Access 8 (2020), after Masson, Rim and Lee,
-/// DDSketch, Proceedings of the VLDB Endowment 12 (2019); cells are those of the binary representation. O(log M) for a value, O(M)
-/// memory.
+/// Source: Epicoco et al., UDDSketch: accurate tracking of quantiles in data streams, IEEE Access 8 (2020), after
+/// Masson, Rim and Lee, DDSketch, Proceedings of the VLDB Endowment 12 (2019); cells are those of the binary
+/// representation. O(log M) for a value, O(M) memory.
 #[derive(Debug)]
 pub(in crate::inspect) struct Counts {
     most: usize,

@@ -3,9 +3,10 @@
 use super::counts::Counts;
 use crate::inspect::outliers::{FEWEST, HALF, NORMAL_SIZE, ORDINARY, THRESHOLD, WINDOW, distance};
 
-/// What [`outliers`](crate::inspect::outliers::outliers) asks of a signal: the distances of its values from the median of the seven around
-/// them, its changes, and the largest of both. The limit follows from two quantiles, which are exact to 2^-10 or better (see [`Counts`]); all
-/// else is as in one piece, while no more values are beyond it than there is room for.
+/// What [`outliers`](crate::inspect::outliers::outliers) asks of a signal: the distances of its values from the median
+/// of the seven around them, its changes, and the largest of both. The limit follows from two quantiles, which are
+/// exact to 2^-10 or better (see [`Counts`]); all else is as in one piece, while no more values are beyond it than
+/// there is room for.
 #[derive(Debug)]
 pub(in crate::inspect) struct Distances {
     /// The last values that are there, and their rows.

@@ -20,7 +20,8 @@ impl Part<'_> {
         segments
     }
 
-    /// Such segments, cut in front so that those of their samples that have all lags up to the longest are rows of the part's own.
+    /// Such segments, cut in front so that those of their samples that have all lags up to the longest are rows of the
+    /// part's own.
     pub(super) fn own(&self, segments: &[Range<usize>], longest: usize) -> Vec<Range<usize>> {
         let first = self.past.saturating_sub(longest);
         segments.iter().map(|segment| segment.start.max(first)..segment.end).collect()

@@ -206,7 +206,8 @@ fn the_delay_is_found() {
     }
 }
 
-/// Of the delays with a confidence of 0.9 or more: the fraction that is right, and the fraction of all delays that they are.
+/// Of the delays with a confidence of 0.9 or more: the fraction that is right, and the fraction of all delays that they
+/// are.
 #[test]
 fn a_sure_delay_is_right() {
     let (mut sure, mut right, mut all) = (0.0, 0.0, 0.0);

@@ -8,8 +8,8 @@ use super::program::Program;
 
 /// Some functions of state, parameters, inputs and time, with their derivatives.
 ///
-/// The results of a program are the functions, then their derivatives by the states, column after column, and in `full` then
-/// those by the parameters too.
+/// The results of a program are the functions, then their derivatives by the states, column after column, and in `full`
+/// then those by the parameters too.
 #[derive(Debug, Clone)]
 pub(super) struct Functions {
     pub(super) by_state: Program,
@@ -47,17 +47,19 @@ pub(super) enum Step {
     Integrated(usize),
 }
 
-/// The model for any kind of number, with exact derivatives. `z` are the unknown parameters after the change of variable.
+/// The model for any kind of number, with exact derivatives. `z` are the unknown parameters after the change of
+/// variable.
 ///
-/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and after these
-/// one for each parameter if the slice has room for them: there are then n + p of them, else n. The slices' lengths must fit;
-/// nothing is allocated once `work` has grown.
+/// Matrices are column-major. Time is in seconds since the first row. A Jacobian has a column for each state, and after
+/// these one for each parameter if the slice has room for them: there are then n + p of them, else n. The slices'
+/// lengths must fit; nothing is allocated once `work` has grown.
 impl GreyBox {
     /// x(k+1) and its Jacobian, of n rows, over a step of `dt` seconds from time `t`.
     ///
-    /// In continuous time a step of h seconds is one of the classical method of order four (Kutta 1901; Hairer, Nørsett and
-    /// Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, table 1.2), and its Jacobian the exact derivative of
-    /// that step, by the chain rule through its stages. With M_j = ∂x_j/∂(x, z), and A = ∂f/∂x, B = ∂f/∂z at stage j:
+    /// In continuous time a step of h seconds is one of the classical method of order four (Kutta 1901; Hairer, Nørsett
+    /// and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, table 1.2), and its Jacobian the exact
+    /// derivative of that step, by the chain rule through its stages. With M_j = ∂x_j/∂(x, z), and A = ∂f/∂x, B = ∂f/∂z
+    /// at stage j:
     ///
     /// ```text
     /// x_j = x + a_j h k_(j-1)       k_j = f(x_j)               a = 0, 1/2, 1/2, 1
@@ -125,7 +127,8 @@ impl GreyBox {
         }
     }
 
-    /// The equations of the next state, or of its derivative with the steps of the integration in a row; and those of the outputs.
+    /// The equations of the next state, or of its derivative with the steps of the integration in a row; and those of
+    /// the outputs.
     pub(crate) fn compiled(&self) -> (&Program, Option<usize>, &Program) {
         let steps = match self.step {
             Step::Next => None,

@@ -193,8 +193,8 @@ fn ascend<T>(input: &mut Input<'_, '_>, node: T) -> Answer<T> {
     Ok(node)
 }
 
-/// Precedence climbing (Pratt 1973). What recurs, a sign and a power, is counted when its operator is read, and again when
-/// its operands are.
+/// Precedence climbing (Pratt 1973). What recurs, a sign and a power, is counted when its operator is read, and again
+/// when its operands are.
 fn sum(input: &mut Input<'_, '_>) -> Answer<Node> {
     expression(operand)
         .prefix(|input: &mut Input<'_, '_>| {

@@ -64,7 +64,8 @@ impl EquationsModel {
     /// The equations with the values that were found, for a filter: nothing of them is unknown.
     ///
     /// # Errors
-    /// [`Error::Model`], [`Error::Argument`] and [`Error::Report`] if the text is no model any more, or has other parameters.
+    /// [`Error::Model`], [`Error::Argument`] and [`Error::Report`] if the text is no model any more, or has other
+    /// parameters.
     pub fn with_values(&self) -> Result<GreyBox, Error> {
         let fitted = self.parameters.iter().map(|parameter| (parameter.name.as_str(), parameter.value));
         let model = self.unfitted()?.with_parameters(&fitted.collect::<Vec<_>>())?;
@@ -78,7 +79,8 @@ impl EquationsModel {
         Ok(model)
     }
 
-    /// The equations as they were before the fit, and what was found for the unknown parameters after the change of variable.
+    /// The equations as they were before the fit, and what was found for the unknown parameters after the change of
+    /// variable.
     pub(crate) fn with_variables(&self) -> Result<(GreyBox, Vec<f64>), Error> {
         self.with_values()?;
         let model = self.unfitted()?;

@@ -1,8 +1,8 @@
 //! Expressions as one graph in which nothing is written twice, and their derivatives as further nodes of it.
 //!
 //! A node is an operation on earlier nodes. Before one is added, an equal one is searched for (hash-consing), so common
-//! subexpressions are computed once, those of derivatives too. Nodes that a rule of algebra makes superfluous are not added:
-//! x + 0, 1 x, 0 x, and constants of constants.
+//! subexpressions are computed once, those of derivatives too. Nodes that a rule of algebra makes superfluous are not
+//! added: x + 0, 1 x, 0 x, and constants of constants.
 
 use std::collections::HashMap;
 

@@ -5,16 +5,16 @@
 //! y = (H (q I - F)^-1 G + D) u + constants = (B(q)/A(q)) u + constants
 //! ```
 //!
-//! A is the characteristic polynomial of F, by Faddeev and Le Verrier's recursion (Gantmacher, The Theory of Matrices, 1959, chapter
-//! IV, section 5), which gives the adjoint of q I - F with it:
+//! A is the characteristic polynomial of F, by Faddeev and Le Verrier's recursion (Gantmacher, The Theory of Matrices,
+//! 1959, chapter IV, section 5), which gives the adjoint of q I - F with it:
 //!
 //! ```text
 //! M_1 = I,   a_k = -tr(F M_k)/k,   M_(k+1) = F M_k + a_k I
 //! A = 1 + sum a_k q^-k,   B = D A + sum (H M_k G) q^-k
 //! ```
 //!
-//! In dual numbers the same operations give the derivatives by the parameters, and with them the covariance of A and B. The recursion
-//! loses digits for many states, about one for each from ten on.
+//! In dual numbers the same operations give the derivatives by the parameters, and with them the covariance of A and B.
+//! The recursion loses digits for many states, about one for each from ten on.
 
 use thetahat_core::{Dual, Number};
 
@@ -32,7 +32,8 @@ impl EquationsModel {
     /// The model of polynomials from all inputs to each output: A y = B u, whatever the noise.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the equations are not linear in states and inputs, or know the time; `what` needs them to be.
+    /// [`Error::Argument`] if the equations are not linear in states and inputs, or know the time; `what` needs them to
+    /// be.
     pub(crate) fn linear(&self, what: &str) -> Result<Vec<PolynomialModel>, Error> {
         let (model, z) = self.with_variables()?;
         if !model.superposes() {

@@ -4,7 +4,8 @@ use thetahat_core::{Activation, Basis, Local, Membership, Neighbours, Network, P
 
 use super::map::Map;
 
-/// A map laid out to be evaluated along a log, with its parameters, by the functions of the core. Nothing of it allocates.
+/// A map laid out to be evaluated along a log, with its parameters, by the functions of the core. Nothing of it
+/// allocates.
 #[derive(Debug, Clone)]
 pub(crate) struct Evaluator {
     theta: Vec<f64>,
@@ -142,7 +143,8 @@ impl Evaluator {
         }
     }
 
-    /// dg/dtheta_j = f_j(z) for each j, and after them, where `into` goes on, the slope of g by each number of the functions.
+    /// dg/dtheta_j = f_j(z) for each j, and after them, where `into` goes on, the slope of g by each number of the
+    /// functions.
     pub(crate) fn gradient(&self, z: &[f64], into: &mut [f64]) {
         let (functions, shape) = into.split_at_mut(self.theta.len());
         if shape.is_empty() {
@@ -185,7 +187,8 @@ impl Evaluator {
         }
     }
 
-    /// dg/dz_i for each i, of the gradient at z where this has the slopes by the numbers of the functions: without f once more.
+    /// dg/dz_i for each i, of the gradient at z where this has the slopes by the numbers of the functions: without f
+    /// once more.
     pub(crate) fn slopes_of_gradient(&self, z: &[f64], gradient: &[f64], into: &mut [f64]) {
         let shape = &gradient[self.theta.len()..];
         let path = |into: &mut [f64]| into.copy_from_slice(&self.theta[1..=z.len()]);

@@ -24,8 +24,8 @@ pub enum Map {
         /// For each function the regressors that are multiplied, from 0 on, in rising order.
         terms: Vec<Vec<usize>>,
     },
-    /// f_j = exp(-|z - alpha_j|^2/sigma_j^2), and with `linear` 1 and each regressor before them (Chen, Cowan and Grant 1991, with
-    /// sigma^2 for their 2 sigma^2).
+    /// f_j = exp(-|z - alpha_j|^2/sigma_j^2), and with `linear` 1 and each regressor before them (Chen, Cowan and Grant
+    /// 1991, with sigma^2 for their 2 sigma^2).
     Radial {
         /// alpha, a point for each function.
         centres: Vec<Vec<f64>>,
@@ -34,18 +34,18 @@ pub enum Map {
         /// Whether 1 and the regressors come first.
         linear: bool,
     },
-    /// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each regressor (Hastie,
-    /// Tibshirani and Friedman 2009, section 5.2.1). A bend of the knots a < b < c is the hat of area 1 over them, integrated twice: it is
-    /// 0 up to a, cubic up to b and from there to c, and z - (a + b + c)/3 after c. So g is a line outside of the knots, where a free run
-    /// may go; other cubic splines are cubics there.
+    /// 1, each regressor, and bends of single regressors, so that g is a sum of natural cubic splines, one of each
+    /// regressor (Hastie, Tibshirani and Friedman 2009, section 5.2.1). A bend of the knots a < b < c is the hat of
+    /// area 1 over them, integrated twice: it is 0 up to a, cubic up to b and from there to c, and z - (a + b + c)/3
+    /// after c. So g is a line outside of the knots, where a free run may go; other cubic splines are cubics there.
     Spline {
         /// For each bend its regressor, from 0 on.
         regressors: Vec<usize>,
         /// For each bend its knots.
         knots: Vec<[f64; 3]>,
     },
-    /// 1, each regressor, and units f(w_j' z + b_j): a network with one hidden layer beside a linear path (Rumelhart, Hinton and Williams
-    /// 1986). theta are the weights of its output.
+    /// 1, each regressor, and units f(w_j' z + b_j): a network with one hidden layer beside a linear path (Rumelhart,
+    /// Hinton and Williams 1986). theta are the weights of its output.
     Network {
         /// f.
         activation: Activation,
@@ -54,8 +54,8 @@ pub enum Map {
         /// b, one for each unit.
         biases: Vec<f64>,
     },
-    /// Local models, planes or constants, each weighted by the membership of z in its box over the sum of all (Nelles 2001, section
-    /// 13.3); outside of the domain weights are those of its nearest point.
+    /// Local models, planes or constants, each weighted by the membership of z in its box over the sum of all (Nelles
+    /// 2001, section 13.3); outside of the domain weights are those of its nearest point.
     Local {
         /// What makes weights of boxes.
         membership: Membership,
@@ -66,8 +66,8 @@ pub enum Map {
         /// For each regressor its range, which the boxes divide.
         domain: Vec<[f64; 2]>,
     },
-    /// Samples, whose outputs are the parameters: those nearest to z give their mean, or a plane through them (Stone 1977; Hastie,
-    /// Tibshirani and Friedman 2009, section 13.3).
+    /// Samples, whose outputs are the parameters: those nearest to z give their mean, or a plane through them (Stone
+    /// 1977; Hastie, Tibshirani and Friedman 2009, section 13.3).
     Neighbours {
         /// How many are asked.
         count: usize,
@@ -119,8 +119,8 @@ impl Activation {
 pub enum Membership {
     /// 1 in its box, 0 outside.
     Rectangle,
-    /// The product, over the regressors, of 1 in the middle half of its box's side, from there a line down to 0 a quarter of a side
-    /// outside.
+    /// The product, over the regressors, of 1 in the middle half of its box's side, from there a line down to 0 a
+    /// quarter of a side outside.
     Trapezoid,
     /// A Gaussian about the middle of its box, with a third of each side for its standard deviations.
     Gaussian,
@@ -204,8 +204,8 @@ impl Map {
         }
     }
 
-    /// The numbers of its functions that training moves, function after function: alpha and 1/sigma of radial basis functions, w and b of
-    /// units. Of other maps, and of steps, none.
+    /// The numbers of its functions that training moves, function after function: alpha and 1/sigma of radial basis
+    /// functions, w and b of units. Of other maps, and of steps, none.
     pub(crate) fn shape(&self) -> Vec<f64> {
         match self {
             Self::Radial { centres, widths, .. } => {
@@ -265,8 +265,8 @@ impl Map {
         }
     }
 
-    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, bend(u(k), 0.5) where the middle knot is 0.5,
-    /// unit1, local1*u(k), or sample1.
+    /// The functions by name, those of the regressors being given: y(k-1)^2*u(k), rbf1, bend(u(k), 0.5) where the
+    /// middle knot is 0.5, unit1, local1*u(k), or sample1.
     pub(crate) fn names(&self, regressors: &[String]) -> Vec<String> {
         match self {
             Self::Polynomial { terms } => terms.iter().map(|term| written(term, regressors)).collect(),

@@ -4,9 +4,10 @@
 //! x' = A x + B u,   x(t + h) = e^(A h) x(t) + int_0^h e^(A s) ds B u,   exp([A B; 0 0] h) = [e^(A h)  int; 0 1]
 //! ```
 //!
-//! (Van Loan, Computing integrals involving the matrix exponential, IEEE Trans. Automatic Control 23 (1978)). One lag has it in closed
-//! form; several by a Taylor series of the matrix divided by 2^k, which is then squared k times (Moler and Van Loan, Nineteen dubious
-//! ways to compute the exponential of a matrix, 1978, method 3). It is exact for equal time constants too, where a sum of exponentials is not.
+//! (Van Loan, Computing integrals involving the matrix exponential, IEEE Trans. Automatic Control 23 (1978)). One lag
+//! has it in closed form; several by a Taylor series of the matrix divided by 2^k, which is then squared k times (Moler
+//! and Van Loan, Nineteen dubious ways to compute the exponential of a matrix, 1978, method 3). It is exact for equal
+//! time constants too, where a sum of exponentials is not.
 
 use thetahat_core::Number;
 
@@ -43,7 +44,8 @@ enum Outputs {
     Last { derivative: bool },
     /// The input and all.
     All,
-    /// So many derivatives of what comes out of 1/A(s), from that itself on. The states are these, each times a power of a frequency.
+    /// So many derivatives of what comes out of 1/A(s), from that itself on. The states are these, each times a power
+    /// of a frequency.
     Derivatives { count: usize, frequency: f64, scales: Columns<f64> },
 }
 
@@ -95,8 +97,9 @@ impl<S: Number<f64>> Chain<S> {
         Self { states: shape.len(), matrix, outputs: Outputs::All, pair: false, integrates: false }
     }
 
-    /// 1/A(s) with A(s) = s^n + a_(n-1) s^(n-1) + … + a_0, of which `shape` holds the coefficients from a_(n-1) on, behind an integrator
-    /// if there is one, and `count` derivatives of it. With v the input of 1/A(s) and w = a_0^(1/n), the states are
+    /// 1/A(s) with A(s) = s^n + a_(n-1) s^(n-1) + … + a_0, of which `shape` holds the coefficients from a_(n-1) on,
+    /// behind an integrator if there is one, and `count` derivatives of it. With v the input of 1/A(s) and w =
+    /// a_0^(1/n), the states are
     ///
     /// ```text
     /// x_k = w^(n-k) s^k/A(s) v,   x_k' = w x_(k+1),   x_(n-1)' = w (v - sum a_k w^(k-n) x_k)
@@ -152,7 +155,8 @@ impl<S: Number<f64>> Chain<S> {
         state
     }
 
-    /// The same of derivatives: 1/A(s) settles at gain u; behind an integrator it rises with gain u a second, and all that is after it rests.
+    /// The same of derivatives: 1/A(s) settles at gain u; behind an integrator it rises with gain u a second, and all
+    /// that is after it rests.
     fn derivatives_at_rest(&self, frequency: f64, u: f64, since: f64) -> State<S> {
         let mut state = [S::from(0.0); MOST_STATES];
         let n = self.states - usize::from(self.integrates);

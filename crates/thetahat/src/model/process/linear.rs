@@ -1,14 +1,15 @@
 //! What a process is to an input that is held between samples: polynomials.
 //!
-//! With T the sample time and a dead time theta = m T - p, m whole and 0 <= p < T, the output at a sample is that p seconds after the
-//! sample m before:
+//! With T the sample time and a dead time theta = m T - p, m whole and 0 <= p < T, the output at a sample is that p
+//! seconds after the sample m before:
 //!
 //! ```text
 //! x(k+1) = F x(k) + G u(k),   y(k) = w'(C (F_p x(k-m) + G_p u(k-m)) + D u(k-m)),   F = e^(A T),  F_p = e^(A p)
 //! ```
 //!
-//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). The polynomials follow by Faddeev and Le Verrier's
-//! recursion (Gantmacher, The Theory of Matrices, 1959, chapter IV, section 5), in dual numbers, which give their covariance.
+//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). The polynomials follow by Faddeev
+//! and Le Verrier's recursion (Gantmacher, The Theory of Matrices, 1959, chapter IV, section 5), in dual numbers, which
+//! give their covariance.
 
 use thetahat_core::{Dual, Number};
 

@@ -33,10 +33,11 @@ const RATES: [[&str; 2]; MOST_POLES + 1] = [
 /// tf21  tf42d …      (b1 s + b0)/(s^2 + a1 s + a0), (b2 s^2 + b1 s + b0)/(s^4 + a3 s^3 + … + a0) e^(-theta s), …
 /// ```
 ///
-/// After `p` stands the number of lags, 0 … 3, then letters: `d` with a dead time theta, `z` with a zero at -1/tau_z, `i` with an
-/// integrator, the factor 1/s; `u` for two of the lags that may be underdamped, 1/(1 + 2 zeta s/omega + s²/omega²) in their place.
-/// `rc` are as many lags side by side with a direct term, as the voltage of a battery has them. After `tf` stand the number of poles,
-/// 1 … 6, and of zeros, no more than poles, then `d` and `i`: an integrator is one of the poles, and the others lie left of the imaginary axis.
+/// After `p` stands the number of lags, 0 … 3, then letters: `d` with a dead time theta, `z` with a zero at -1/tau_z,
+/// `i` with an integrator, the factor 1/s; `u` for two of the lags that may be underdamped, 1/(1 + 2 zeta s/omega +
+/// s²/omega²) in their place. `rc` are as many lags side by side with a direct term, as the voltage of a battery has
+/// them. After `tf` stand the number of poles, 1 … 6, and of zeros, no more than poles, then `d` and `i`: an integrator
+/// is one of the poles, and the others lie left of the imaginary axis.
 ///
 /// ```
 /// use thetahat::model::ProcessStructure;
@@ -111,7 +112,8 @@ impl ProcessStructure {
         Ok(Self { lags, kind: Kind::Rational(own) })
     }
 
-    /// The names of the parameters, in their order: gain, lags, zero, dead time. Times are in seconds, `omega` in rad/s.
+    /// The names of the parameters, in their order: gain, lags, zero, dead time. Times are in seconds, `omega` in
+    /// rad/s.
     pub fn names(&self) -> Vec<String> {
         let numbered = |name: &str, count: usize| -> Vec<String> {
             match count {
@@ -195,7 +197,8 @@ impl ProcessStructure {
         }
     }
 
-    /// The unit of a parameter of this name: s, rad/s, or what the gains are in; of coefficients with the power of 1/s that they have.
+    /// The unit of a parameter of this name: s, rad/s, or what the gains are in; of coefficients with the power of 1/s
+    /// that they have.
     pub fn unit(&self, name: &str) -> &'static str {
         let bare = name.split('[').next().unwrap_or(name);
         match bare {
@@ -265,7 +268,8 @@ impl ProcessStructure {
         matches!(self.kind, Kind::Rational(_))
     }
 
-    /// The same with every derivative for a column, behind an integrator or not, and no dead time: what filters with 1/A(s).
+    /// The same with every derivative for a column, behind an integrator or not, and no dead time: what filters with
+    /// 1/A(s).
     pub(crate) fn derivatives(&self, integrator: bool) -> Self {
         let own = Rational { zeros: self.lags, integrator, dead_time: false };
         Self { lags: self.lags, kind: Kind::Rational(own) }
@@ -280,8 +284,8 @@ impl ProcessStructure {
         self.lags - if self.is_underdamped() { 2 } else { 0 }
     }
 
-    /// The columns that the output is a sum of: the state at the end of the chain, with a zero its derivative, with more zeros as many
-    /// derivatives; side by side the input and each lag.
+    /// The columns that the output is a sum of: the state at the end of the chain, with a zero its derivative, with
+    /// more zeros as many derivatives; side by side the input and each lag.
     pub(crate) fn columns(&self) -> usize {
         match self.kind {
             Kind::Parallel => 1 + self.lags,
@@ -346,7 +350,8 @@ impl ProcessStructure {
         }
     }
 
-    /// The slopes of the output by the parameters, from those of the sum of the columns by the shape and by the dead time.
+    /// The slopes of the output by the parameters, from those of the sum of the columns by the shape and by the dead
+    /// time.
     pub(crate) fn own_slopes(
         &self,
         parts: &Parts<f64>,
@@ -398,7 +403,8 @@ impl ProcessStructure {
         }
     }
 
-    /// A structure to start the search for this one from: without the pair, then without the zero, then with one lag less.
+    /// A structure to start the search for this one from: without the pair, then without the zero, then with one lag
+    /// less.
     pub(crate) fn simpler(&self) -> Option<Self> {
         match self.kind {
             Kind::Series(series) if series.underdamped => {
@@ -417,9 +423,11 @@ impl ProcessStructure {
 /// The parameters of a process taken apart.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Parts<S> {
-    /// A weight for each column: the gain, and with a zero the gain times tau_z; side by side R0, R1, …; b0, b1, … of a transfer function.
+    /// A weight for each column: the gain, and with a zero the gain times tau_z; side by side R0, R1, …; b0, b1, … of a
+    /// transfer function.
     pub(crate) weights: Vec<S>,
-    /// The time constants; before them omega and zeta of a pair. Of a transfer function the coefficients of its denominator.
+    /// The time constants; before them omega and zeta of a pair. Of a transfer function the coefficients of its
+    /// denominator.
     pub(crate) shape: Vec<S>,
     /// theta, in seconds.
     pub(crate) dead_time: S,

@@ -17,9 +17,10 @@ const STEPS: usize = 100;
 pub struct Reduced {
     /// The model. Its states are balanced, the most important first, after those of poles that are kept.
     pub model: StateSpace,
-    /// An upper bound of what the truncation does to the frequency response from [u; e], e in units of its deviation, to y: of the
-    /// largest singular value of the difference at any frequency, in the units of y by those of u. It is twice the sum of the Hankel
-    /// singular values that are left out. No model with so many states has a difference below the first of them.
+    /// An upper bound of what the truncation does to the frequency response from [u; e], e in units of its deviation,
+    /// to y: of the largest singular value of the difference at any frequency, in the units of y by those of u. It is
+    /// twice the sum of the Hankel singular values that are left out. No model with so many states has a difference
+    /// below the first of them.
     pub error_bound: f64,
 }
 
@@ -40,14 +41,15 @@ struct Balance {
 }
 
 impl StateSpace {
-    /// The Hankel singular values of the model, falling: how much of its inputs each state in balanced coordinates passes on to its
-    /// outputs. Infinity for each pole that is kept; zero, or rounding, for states that are not needed.
+    /// The Hankel singular values of the model, falling: how much of its inputs each state in balanced coordinates
+    /// passes on to its outputs. Infinity for each pole that is kept; zero, or rounding, for states that are not
+    /// needed.
     ///
     /// [`StateSpace::reduced`] has the equations. O(n^3).
     ///
     /// # Errors
-    /// [`Error::Argument`] for matrices whose shapes do not fit, or that are not finite; [`Error::Undetermined`] where a decomposition
-    /// does not converge.
+    /// [`Error::Argument`] for matrices whose shapes do not fit, or that are not finite; [`Error::Undetermined`] where
+    /// a decomposition does not converge.
     ///
     /// ```
     /// use thetahat::model::StateSpace;
@@ -74,8 +76,8 @@ impl StateSpace {
         Ok(values)
     }
 
-    /// The same model in balanced coordinates, without the states that are not needed: both its Gramians are the diagonal matrix of its
-    /// Hankel singular values. O(n^3).
+    /// The same model in balanced coordinates, without the states that are not needed: both its Gramians are the
+    /// diagonal matrix of its Hankel singular values. O(n^3).
     ///
     /// # Errors
     /// Those of [`StateSpace::reduced`].
@@ -87,44 +89,47 @@ impl StateSpace {
 
     /// The model with so many states by balanced truncation.
     ///
-    /// The inputs are u and e together, e in units of its deviation, W(z) = H (z I - F)^-1 B + [D, L] with B = [G, K L] and
-    /// L L' = noise_covariance: a state that predictions need is as important as one that the inputs move. The Gramians
+    /// The inputs are u and e together, e in units of its deviation, W(z) = H (z I - F)^-1 B + [D, L] with B = [G, K L]
+    /// and L L' = noise_covariance: a state that predictions need is as important as one that the inputs move. The
+    /// Gramians
     ///
     /// ```text
     /// P = F P F' + B B'   (how far inputs of unit energy move a state),   Q = F' Q F + H' H   (the energy of the outputs of a state)
     /// ```
     ///
-    /// are computed as roots, P = S S' and Q = R R', by doubling with a QR decomposition each time, so that the small ones keep their
-    /// digits:
+    /// are computed as roots, P = S S' and Q = R R', by doubling with a QR decomposition each time, so that the small
+    /// ones keep their digits:
     ///
     /// ```text
     /// S_{i+1} = [S_i, F_i S_i],   F_{i+1} = F_i^2,   S_0 = B
     /// ```
     ///
-    /// (Smith, SIAM J. Applied Math. 16, 1968; Penzl, SIAM J. Sci. Comput. 21, 2000). With R' S = U Sigma V' and the first r columns of
-    /// each, x = S V Sigma^-½ z and z = Sigma^-½ U' R' x: both Gramians of z are Sigma, the Hankel singular values (Moore, IEEE Trans.
-    /// Automatic Control 26, 1981; Tombs and Postlethwaite, Int. J. Control 46, 1987). What is left out changes W by no more than twice
-    /// their sum (Enns 1984; Glover, Int. J. Control 39, 1984; for samples Al-Saggaf and Franklin, IEEE Trans. Automatic Control 32,
-    /// 1987), and what is left is stable (Pernebo and Silverman, IEEE Trans. Automatic Control 27, 1982). The part of u alone obeys the same
-    /// bound. The static gain changes within it too.
+    /// (Smith, SIAM J. Applied Math. 16, 1968; Penzl, SIAM J. Sci. Comput. 21, 2000). With R' S = U Sigma V' and the
+    /// first r columns of each, x = S V Sigma^-½ z and z = Sigma^-½ U' R' x: both Gramians of z are Sigma, the Hankel
+    /// singular values (Moore, IEEE Trans. Automatic Control 26, 1981; Tombs and Postlethwaite, Int. J. Control 46,
+    /// 1987). What is left out changes W by no more than twice their sum (Enns 1984; Glover, Int. J. Control 39, 1984;
+    /// for samples Al-Saggaf and Franklin, IEEE Trans. Automatic Control 32, 1987), and what is left is stable (Pernebo
+    /// and Silverman, IEEE Trans. Automatic Control 27, 1982). The part of u alone obeys the same bound. The static
+    /// gain changes within it too.
     ///
-    /// Integrators, unstable poles, and poles of a modulus above 1 - 10^-5 have no Gramians: they are kept as they are, split from
-    /// the others by the sign of a matrix (Roberts, Int. J. Control 32, 1980), and count among the states.
+    /// Integrators, unstable poles, and poles of a modulus above 1 - 10^-5 have no Gramians: they are kept as they are,
+    /// split from the others by the sign of a matrix (Roberts, Int. J. Control 32, 1980), and count among the states.
     ///
-    /// Where truncation leaves an unstable predictor F - K H, K and noise_covariance are replaced by those of the stable one whose noise
-    /// has the same spectrum. With A = F - K H, and A_u and H_u what A and H are on its unstable subspace V:
+    /// Where truncation leaves an unstable predictor F - K H, K and noise_covariance are replaced by those of the
+    /// stable one whose noise has the same spectrum. With A = F - K H, and A_u and H_u what A and H are on its unstable
+    /// subspace V:
     ///
     /// ```text
     /// A_u' Y A_u = Y + H_u' R^-1 H_u,   P = V Y^-1 V',   innovations of cov M = H P H' + R,   K + A P H' M^-1,   R = noise_covariance
     /// ```
     ///
-    /// (Anderson and Moore, Optimal Filtering, 1979, section 9.3: P is the stabilising solution of the Riccati equation of the filter.)
-    /// The bound is that of the noise before. O(n^3).
+    /// (Anderson and Moore, Optimal Filtering, 1979, section 9.3: P is the stabilising solution of the Riccati equation
+    /// of the filter.) The bound is that of the noise before. O(n^3).
     ///
     /// # Errors
-    /// [`Error::Argument`] for an order below the number of poles that are kept or above that of the states that are needed, matrices
-    /// whose shapes do not fit or that are not finite; [`Error::Undetermined`] where a decomposition does not converge, or no predictor is
-    /// stable.
+    /// [`Error::Argument`] for an order below the number of poles that are kept or above that of the states that are
+    /// needed, matrices whose shapes do not fit or that are not finite; [`Error::Undetermined`] where a decomposition
+    /// does not converge, or no predictor is stable.
     ///
     /// ```
     /// use thetahat::model::StateSpace;
@@ -323,8 +328,8 @@ struct Parts {
 }
 
 /// The invariant subspaces of the eigenvalues inside a circle and of the others. With r between the two, the sign of
-/// (F/r - I)(F/r + I)^-1 is -I on the one and I on the other (Roberts 1980), by Newton's X <- (X + X^-1)/2 with scaled determinants
-/// (Higham, Functions of Matrices, 2008, section 5.5).
+/// (F/r - I)(F/r + I)^-1 is -I on the one and I on the other (Roberts 1980), by Newton's X <- (X + X^-1)/2 with scaled
+/// determinants (Higham, Functions of Matrices, 2008, section 5.5).
 fn split(matrix: &DMatrix<f64>, radius: f64) -> Result<Parts, Error> {
     let n = matrix.nrows();
     let identity = DMatrix::<f64>::identity(n, n);

@@ -22,7 +22,8 @@ pub enum Hold {
     /// It moves along a straight line to the next sample. `foh`.
     #[serde(rename = "foh")]
     First,
-    /// Any: z = (1 + s T/2)/(1 - s T/2), which maps one stable half to the other but bends frequencies, w to 2/T tan(w T/2). `tustin`.
+    /// Any: z = (1 + s T/2)/(1 - s T/2), which maps one stable half to the other but bends frequencies, w to 2/T tan(w
+    /// T/2). `tustin`.
     Tustin,
 }
 
@@ -64,9 +65,9 @@ impl FromStr for Hold {
 /// y     = C x + D u + e,   e white with the spectral density noise_intensity
 /// ```
 ///
-/// Time is in seconds. e is a mathematical fiction, as its variance is infinite; what has a meaning is its mean over a time T, of the
-/// covariance noise_intensity / T (Åström, Introduction to Stochastic Control Theory, 1970, section 3.10). Made by
-/// [`StateSpace::to_continuous`].
+/// Time is in seconds. e is a mathematical fiction, as its variance is infinite; what has a meaning is its mean over a
+/// time T, of the covariance noise_intensity / T (Åström, Introduction to Stochastic Control Theory, 1970, section
+/// 3.10). Made by [`StateSpace::to_continuous`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContinuousStateSpace {
     /// A, n x n, a second.
@@ -98,8 +99,8 @@ impl ContinuousStateSpace {
 }
 
 impl StateSpace {
-    /// The model in continuous time that gives this one when it is sampled: [`ContinuousStateSpace::sampled`] has the equations, of which
-    /// these are the inverse. With T the sample time, and phi_1 and phi_2 of A T as there:
+    /// The model in continuous time that gives this one when it is sampled: [`ContinuousStateSpace::sampled`] has the
+    /// equations, of which these are the inverse. With T the sample time, and phi_1 and phi_2 of A T as there:
     ///
     /// ```text
     /// zoh     A = log(F)/T,   B = (T phi_1)^-1 G,     C = H,   D = D
@@ -107,13 +108,13 @@ impl StateSpace {
     /// tustin  A = 2/T (F - I)(F + I)^-1,   B = 2/T (F + I)^-1 G,   C = 2 H (F + I)^-1,   D = D - H (F + I)^-1 G
     /// ```
     ///
-    /// log is the principal logarithm: a pole p becomes ln(p)/T, with an imaginary part between -pi/T and pi/T. Faster oscillations were
-    /// seen as slower ones when they were sampled, and come back as those. O(n^3).
+    /// log is the principal logarithm: a pole p becomes ln(p)/T, with an imaginary part between -pi/T and pi/T. Faster
+    /// oscillations were seen as slower ones when they were sampled, and come back as those. O(n^3).
     ///
     /// # Errors
-    /// With `zoh` and `foh` [`Error::Undetermined`] for poles at or left of 0, which it names: they have no real logarithm. One at 0 is a
-    /// delay of a sample. With `tustin` the same for poles at -1, and where F - K H has an eigenvalue there. [`Error::Argument`] for
-    /// matrices whose shapes do not fit or that are not finite.
+    /// With `zoh` and `foh` [`Error::Undetermined`] for poles at or left of 0, which it names: they have no real
+    /// logarithm. One at 0 is a delay of a sample. With `tustin` the same for poles at -1, and where F - K H has an
+    /// eigenvalue there. [`Error::Argument`] for matrices whose shapes do not fit or that are not finite.
     ///
     /// ```
     /// use thetahat::model::{Hold, StateSpace};
@@ -190,8 +191,8 @@ impl StateSpace {
 }
 
 impl ContinuousStateSpace {
-    /// The model as it looks at samples every T seconds, the inputs doing between them what `hold` says. With phi_0 = e^(A T),
-    /// phi_1 = integral_0^1 e^(A T s) ds and phi_2 = integral_0^1 (1 - s) e^(A T s) ds:
+    /// The model as it looks at samples every T seconds, the inputs doing between them what `hold` says. With phi_0 =
+    /// e^(A T), phi_1 = integral_0^1 e^(A T s) ds and phi_2 = integral_0^1 (1 - s) e^(A T s) ds:
     ///
     /// ```text
     /// zoh     F = phi_0,   G = T phi_1 B,     H = C,   D = D                    x at the samples
@@ -199,18 +200,19 @@ impl ContinuousStateSpace {
     /// tustin  F = P (I + A T/2),   G = T P B,   H = C P,   D = D + T/2 C P B,   P = (I - A T/2)^-1
     /// ```
     ///
-    /// (Franklin, Powell and Workman, Digital Control of Dynamic Systems, 3rd ed. 1998, sections 4.3, 6.1 and 6.3.2; phi_1^2 is
-    /// phi_1 + (phi_0 - I) phi_2.)
+    /// (Franklin, Powell and Workman, Digital Control of Dynamic Systems, 3rd ed. 1998, sections 4.3, 6.1 and 6.3.2;
+    /// phi_1^2 is phi_1 + (phi_0 - I) phi_2.)
     ///
-    /// The innovations are one more input. With `zoh` and `foh` they are held over a sample, K = T phi_1 K with the covariance
-    /// noise_intensity / T: independent samples are not joined by lines. With `tustin` they are mapped as all inputs are, and then scaled
-    /// so that they enter the outputs with I, E = I + T/2 C P K: K = T P K E^-1, covariance E noise_intensity E' / T. So `tustin` keeps a
-    /// stable predictor stable; `zoh` and `foh` may not, where the noise has zeros much faster than the samples. O(n^3).
+    /// The innovations are one more input. With `zoh` and `foh` they are held over a sample, K = T phi_1 K with the
+    /// covariance noise_intensity / T: independent samples are not joined by lines. With `tustin` they are mapped as
+    /// all inputs are, and then scaled so that they enter the outputs with I, E = I + T/2 C P K: K = T P K E^-1,
+    /// covariance E noise_intensity E' / T. So `tustin` keeps a stable predictor stable; `zoh` and `foh` may not, where
+    /// the noise has zeros much faster than the samples. O(n^3).
     ///
     /// # Errors
     /// [`Error::Argument`] for a time that is not above 0, matrices whose shapes do not fit or that are not finite;
-    /// [`Error::Undetermined`] where e^(A T) leaves the range of numbers, and with `tustin` for a pole at 2/T or where A - K C has an
-    /// eigenvalue there.
+    /// [`Error::Undetermined`] where e^(A T) leaves the range of numbers, and with `tustin` for a pole at 2/T or where
+    /// A - K C has an eigenvalue there.
     ///
     /// ```
     /// use thetahat::model::{ContinuousStateSpace, Hold};
@@ -291,10 +293,12 @@ impl ContinuousStateSpace {
         Ok(StateSpace { f, g, h: self.c.clone(), d, k, noise_covariance, sample_time: seconds })
     }
 
-    /// The eigenvalues of A, in radians a second; of a conjugate pair the positive imaginary part first. Largest first. O(n^3).
+    /// The eigenvalues of A, in radians a second; of a conjugate pair the positive imaginary part first. Largest first.
+    /// O(n^3).
     ///
     /// # Errors
-    /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite; [`Error::Undetermined`] where they do not converge.
+    /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite; [`Error::Undetermined`] where
+    /// they do not converge.
     pub fn poles(&self) -> Result<Vec<Complex<f64>>, Error> {
         self.check()?;
         eigen::eigenvalues(&self.a)

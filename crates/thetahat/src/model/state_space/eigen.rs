@@ -53,9 +53,9 @@ pub(crate) fn symmetric_eigen(matrix: &DMatrix<f64>) -> Option<(DVector<f64>, DM
 
 /// The finite z with det(A - z B) = 0, in the order of [`eigenvalues`].
 ///
-/// With a shift s they are s + 1/mu for the eigenvalues mu of (A - s B)^-1 B, those at infinity having mu = 0: so B may be singular (Saad,
-/// Numerical Methods for Large Eigenvalue Problems, 2nd ed. 2011, section 8.3). Of some shifts that is taken which lies farthest from the
-/// eigenvalues. O(n^3), and as much again for each eigenvalue at zero.
+/// With a shift s they are s + 1/mu for the eigenvalues mu of (A - s B)^-1 B, those at infinity having mu = 0: so B may
+/// be singular (Saad, Numerical Methods for Large Eigenvalue Problems, 2nd ed. 2011, section 8.3). Of some shifts that
+/// is taken which lies farthest from the eigenvalues. O(n^3), and as much again for each eigenvalue at zero.
 pub(super) fn pencil(a: DMatrix<f64>, b: DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let Deflated { a, b, at_zero } = deflated(a, b)?;
     let inverted = SHIFTS.iter().filter_map(|&shift| {
@@ -78,8 +78,8 @@ struct Deflated {
     at_zero: usize,
 }
 
-/// Takes the eigenvalues at zero off. One of multiplicity k would come out as k numbers of modulus eps^(1/k); so, with A v = 0, reflections
-/// take v to the first column of A, which vanishes, and B v to the first row of B.
+/// Takes the eigenvalues at zero off. One of multiplicity k would come out as k numbers of modulus eps^(1/k); so, with
+/// A v = 0, reflections take v to the first column of A, which vanishes, and B v to the first row of B.
 fn deflated(mut a: DMatrix<f64>, mut b: DMatrix<f64>) -> Result<Deflated, Error> {
     if !a.iter().chain(b.iter()).all(|value| value.is_finite()) {
         return Err(Error::argument("model", "a matrix has an entry that is not a finite number"));

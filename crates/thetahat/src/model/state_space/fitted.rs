@@ -20,8 +20,8 @@ const INTEGRATOR: f64 = 1e-9;
 /// y(t)   = H x(t) + D u(t) + e(t),   cov e = noise_covariance
 /// ```
 ///
-/// y and u are deviations from the signals' offsets. The coordinates of x are a matter of choice, so that entries of the matrices have no
-/// errors of their own; see [`EntryCovariance`].
+/// y and u are deviations from the signals' offsets. The coordinates of x are a matter of choice, so that entries of
+/// the matrices have no errors of their own; see [`EntryCovariance`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StateSpaceModel {
     /// Seconds from one sample to the next.
@@ -47,7 +47,8 @@ pub struct StateSpaceModel {
     /// How uncertain the matrices are; none where no theory says it, as after a subspace method.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<EntryCovariance>,
-    /// N - p/l for N samples of l outputs and p free parameters, states at the start of segments among them where these were estimated.
+    /// N - p/l for N samples of l outputs and p free parameters, states at the start of segments among them where these
+    /// were estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
     /// p, the free parameters of a canonical form: n (inputs + 2 outputs), and those of D where it was estimated.
@@ -116,7 +117,8 @@ impl StateSpaceModel {
         Ok(model)
     }
 
-    /// The same with the covariance of the entries of the plant, without the states that wait, and the errors of what follows from them.
+    /// The same with the covariance of the entries of the plant, without the states that wait, and the errors of what
+    /// follows from them.
     pub(crate) fn with_covariance(mut self, covariance: EntryCovariance) -> Self {
         let covariance = covariance.delayed(self.order(), &self.delays);
         let matrices = self.matrices();

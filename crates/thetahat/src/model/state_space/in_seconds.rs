@@ -26,10 +26,12 @@ const MOST_WAITING: f64 = 1000.0;
 /// y     = C x + D u(t - delay) + e
 /// ```
 ///
-/// y and u are deviations from the signals' offsets, time is in seconds, and between two samples an input does what `hold` says.
+/// y and u are deviations from the signals' offsets, time is in seconds, and between two samples an input does what
+/// `hold` says.
 ///
-/// It was made from a model with the sample time `sample_time`, and of the noise it says what that one said: e is what a sensor adds to each
-/// sample and what moves the state until the next one. Over `sample_time` its mean has the covariance noise_intensity/sample_time.
+/// It was made from a model with the sample time `sample_time`, and of the noise it says what that one said: e is what
+/// a sensor adds to each sample and what moves the state until the next one. Over `sample_time` its mean has the
+/// covariance noise_intensity/sample_time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ContinuousStateSpaceModel {
     /// The sample time in seconds of the model that it was made from.
@@ -93,7 +95,8 @@ impl ContinuousStateSpaceModel {
     /// A model with what follows from its matrices.
     ///
     /// # Errors
-    /// [`Error::Argument`] for matrices that do not fit or are not finite; [`Error::Undetermined`] if the eigenvalues do not converge.
+    /// [`Error::Argument`] for matrices that do not fit or are not finite; [`Error::Undetermined`] if the eigenvalues
+    /// do not converge.
     pub(in crate::model) fn new(head: Head, matrices: &ContinuousStateSpace) -> Result<Self, Error> {
         let rows = |matrix: &DMatrix<f64>| -> Vec<Vec<f64>> {
             matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
@@ -198,7 +201,8 @@ impl ContinuousStateSpaceModel {
     /// Zeros, poles and gain from an input to an output in the s plane, without the delay.
     ///
     /// # Errors
-    /// [`Error::Argument`] if there is no such input or output; [`Error::Undetermined`] where the eigenvalues do not converge.
+    /// [`Error::Argument`] if there is no such input or output; [`Error::Undetermined`] where the eigenvalues do not
+    /// converge.
     pub fn transfer(&self, output: usize, input: usize) -> Result<ZerosPolesGain, Error> {
         // Zeros and poles of a quotient are those of it in s as in z.
         self.matrices().renamed().transfer(output, input)
@@ -206,26 +210,27 @@ impl ContinuousStateSpaceModel {
 
     /// The model as samples every so many seconds see it, between which inputs do what `hold` says.
     ///
-    /// The plant is that of [`ContinuousStateSpace::sampled`]. A delay of d samples and a part is d samples that wait; for the part, with a
-    /// zero-order hold, the sample before the newest acts on for that long (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed.
-    /// 1997, section 2.3), exactly, and is a further state.
+    /// The plant is that of [`ContinuousStateSpace::sampled`]. A delay of d samples and a part is d samples that wait;
+    /// for the part, with a zero-order hold, the sample before the newest acts on for that long (Åström and Wittenmark,
+    /// Computer-Controlled Systems, 3rd ed. 1997, section 2.3), exactly, and is a further state.
     ///
-    /// The noise is that of single measurements. With T the sample time of the model that this one was made from, F and K its matrices, R the
-    /// covariance of its e, and m new samples in the place of each of its samples, m above 1:
+    /// The noise is that of single measurements. With T the sample time of the model that this one was made from, F and
+    /// K its matrices, R the covariance of its e, and m new samples in the place of each of its samples, m above 1:
     ///
     /// ```text
     /// R' = R,   S' = F^(m-1) K R,   W' = sum over i < m of F^i K R K' F'^i
     /// ```
     ///
-    /// are the covariances of what the outputs see, of the two together, and of what moves the state; the innovations are those of the
-    /// stationary Kalman filter for them. That is exact for whole m: e is added to every m-th sample as to the others. The last part of an m
-    /// that is not whole has the noise of a sample held over it, which is an assumption. With `tustin` the noise is mapped as inputs are,
-    /// its intensity being kept. O(n^3 log m).
+    /// are the covariances of what the outputs see, of the two together, and of what moves the state; the innovations
+    /// are those of the stationary Kalman filter for them. That is exact for whole m: e is added to every m-th sample
+    /// as to the others. The last part of an m that is not whole has the noise of a sample held over it, which is an
+    /// assumption. With `tustin` the noise is mapped as inputs are, its intensity being kept. O(n^3 log m).
     ///
     /// # Errors
-    /// [`Error::Argument`] for a time that is not above 0 or leaves an input waiting for more than 1000 samples, and for holds but `zoh`
-    /// where a delay is no whole number of samples; those of [`ContinuousStateSpace::sampled`]; [`Error::Undetermined`] where no predictor
-    /// is stable, and where the state moves by less than rounding within a sample.
+    /// [`Error::Argument`] for a time that is not above 0 or leaves an input waiting for more than 1000 samples, and
+    /// for holds but `zoh` where a delay is no whole number of samples; those of [`ContinuousStateSpace::sampled`];
+    /// [`Error::Undetermined`] where no predictor is stable, and where the state moves by less than rounding within a
+    /// sample.
     ///
     /// Errors of the matrices go through by differences to either side along each direction in which they vary.
     ///
@@ -429,8 +434,8 @@ impl ContinuousStateSpaceModel {
     }
 }
 
-/// The plant whose inputs each act so many seconds late, less than a sample, after a zero-order hold: G is then split into what the
-/// newest sample does and what the one before it does, which is a state more.
+/// The plant whose inputs each act so many seconds late, less than a sample, after a zero-order hold: G is then split
+/// into what the newest sample does and what the one before it does, which is a state more.
 fn late(continuous: &ContinuousStateSpace, sampled: StateSpace, parts: &[f64]) -> Result<StateSpace, Error> {
     let late: Vec<usize> = (0..parts.len()).filter(|input| parts[*input] > 0.0).collect();
     if late.is_empty() {

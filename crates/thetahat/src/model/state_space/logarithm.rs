@@ -52,15 +52,15 @@ const STEPS: usize = 60;
 /// phi_0 = e^M,   phi_1 = sum M^k/(k+1)! = integral_0^1 e^(M s) ds,   phi_2 = sum M^k/(k+2)! = integral_0^1 (1 - s) e^(M s) ds
 /// ```
 ///
-/// which for X = M/2^s are the first row of blocks of exp [X I 0; 0 0 I; 0 0 0] (Van Loan, IEEE Trans. Automatic Control 23, 1978), and from
-/// there on s times
+/// which for X = M/2^s are the first row of blocks of exp [X I 0; 0 0 I; 0 0 0] (Van Loan, IEEE Trans. Automatic
+/// Control 23, 1978), and from there on s times
 ///
 /// ```text
 /// phi_2(2X) = (phi_1(X)^2 + 2 phi_2(X))/4,   phi_1(2X) = (phi_0(X) + I) phi_1(X)/2,   phi_0(2X) = phi_0(X)^2
 /// ```
 ///
-/// (Higham, Functions of Matrices, 2008, section 10.7.4): squares of the blocks themselves would lose the integrals of fast poles beside
-/// slow ones. None where they leave the range of numbers. O(n^3).
+/// (Higham, Functions of Matrices, 2008, section 10.7.4): squares of the blocks themselves would lose the integrals of
+/// fast poles beside slow ones. None where they leave the range of numbers. O(n^3).
 pub(super) fn integrals(matrix: &DMatrix<f64>) -> Option<[DMatrix<f64>; 3]> {
     let n = matrix.nrows();
     // The norm does not count what is not a number.
@@ -95,8 +95,8 @@ fn norm<T: ComplexField<RealField = f64>>(matrix: &DMatrix<T>) -> f64 {
     sums.fold(0.0, f64::max)
 }
 
-/// How often a matrix must be halved for [`pade`] to have all digits: no more than norms of its powers say (Al-Mohy and Higham, SIAM J.
-/// Matrix Anal. Appl. 31, 2009, algorithm 5.1).
+/// How often a matrix must be halved for [`pade`] to have all digits: no more than norms of its powers say (Al-Mohy and
+/// Higham, SIAM J. Matrix Anal. Appl. 31, 2009, algorithm 5.1).
 fn halvings(matrix: &DMatrix<f64>) -> u32 {
     let second = matrix * matrix;
     let fourth = &second * &second;
@@ -133,8 +133,8 @@ fn pade(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     eigen::solved(&even - &odd, &(even + odd))
 }
 
-/// The principal logarithm of a matrix without eigenvalues at or left of 0: that with the imaginary parts of its eigenvalues between
-/// -pi and pi.
+/// The principal logarithm of a matrix without eigenvalues at or left of 0: that with the imaginary parts of its
+/// eigenvalues between -pi and pi.
 ///
 /// By inverse scaling and squaring of the Schur form: roots are taken until T is near I, and then with X = T - I
 ///
@@ -142,9 +142,10 @@ fn pade(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
 /// log(I + X) = integral_0^1 X (I + s X)^-1 ds
 /// ```
 ///
-/// by Gauss and Legendre, which is Padé's approximation (Higham, Functions of Matrices, 2008, algorithm 11.9; roots of triangular
-/// matrices by Björck and Hammarling, section 6.2). The diagonal is that of exact logarithms. None where the exponential of what is
-/// found is not the matrix, as with eigenvalues that are almost negative. O(n^3) for each root, of which 10 are common.
+/// by Gauss and Legendre, which is Padé's approximation (Higham, Functions of Matrices, 2008, algorithm 11.9; roots of
+/// triangular matrices by Björck and Hammarling, section 6.2). The diagonal is that of exact logarithms. None where the
+/// exponential of what is found is not the matrix, as with eigenvalues that are almost negative. O(n^3) for each root,
+/// of which 10 are common.
 pub(super) fn logarithm(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = matrix.nrows();
     if n == 0 {

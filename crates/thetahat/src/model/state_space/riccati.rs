@@ -20,7 +20,8 @@ const DOUBLINGS: usize = 60;
 /// W = (I + B_i P_i)^-1,   A_{i+1} = A_i W A_i,   B_{i+1} = B_i + A_i W B_i A_i',   P_{i+1} = P_i + A_i' P_i W A_i
 /// ```
 ///
-/// (Chu, Fan, Lin and Wang, Int. J. Control 77, 2004, section 2). None where it does not converge. Cost: about 10 n^3 a doubling.
+/// (Chu, Fan, Lin and Wang, Int. J. Control 77, 2004, section 2). None where it does not converge. Cost: about 10 n^3 a
+/// doubling.
 pub(crate) fn stationary(model: &StateSpace, rest: &DMatrix<f64>) -> Option<StateSpace> {
     let n = model.f.nrows();
     let identity = DMatrix::identity(n, n);

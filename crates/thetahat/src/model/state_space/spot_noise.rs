@@ -10,8 +10,8 @@ use crate::Error;
 /// Parts of a sample below this are none.
 pub(super) const WHOLE: f64 = 1e-9;
 
-/// Sums of what happens from step to step: what is left of a state after all of them, what a held input has done, the covariance that noise
-/// gave the state.
+/// Sums of what happens from step to step: what is left of a state after all of them, what a held input has done, the
+/// covariance that noise gave the state.
 #[derive(Debug, Clone)]
 pub(in crate::model) struct Steps {
     pub(in crate::model) f: DMatrix<f64>,
@@ -55,12 +55,12 @@ impl Steps {
 }
 
 impl StateSpace {
-    /// The model with innovations of which F - K H is stable, for a state that noise of the covariance W, `moved`, moves from sample to sample
-    /// and outputs that see a noise of the covariance R: the model holds R as `noise_covariance` and S R^-1 as `k`, S being the covariance of
-    /// the two.
+    /// The model with innovations of which F - K H is stable, for a state that noise of the covariance W, `moved`,
+    /// moves from sample to sample and outputs that see a noise of the covariance R: the model holds R as
+    /// `noise_covariance` and S R^-1 as `k`, S being the covariance of the two.
     ///
-    /// K and the covariance of the innovations are those of the stationary Kalman filter (Anderson and Moore, Optimal Filtering, 1979,
-    /// section 9.3), so that the spectrum of the noise is the same. O(n^3).
+    /// K and the covariance of the innovations are those of the stationary Kalman filter (Anderson and Moore, Optimal
+    /// Filtering, 1979, section 9.3), so that the spectrum of the noise is the same. O(n^3).
     ///
     /// # Errors
     /// [`Error::Undetermined`] where no gain gives a stable predictor, or numbers leave their range.

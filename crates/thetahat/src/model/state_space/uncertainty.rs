@@ -42,10 +42,11 @@ pub struct Entry {
 
 /// How uncertain the matrices of a state-space model are.
 ///
-/// In other coordinates T x of the state the matrices are T F T^-1, T G, H T^-1, D and T K, and nothing that can be measured changes. So of all
-/// entries n^2 can be held, and what is estimated is how the others vary: as the free entries of a canonical form do. Which entries are held is
-/// chosen so that the covariance of the others is well conditioned. Poles, gains and responses have the errors that follow from it,
-/// whatever the choice; an entry by itself has none (McKelvey, Helmersson and Ribarits, Automatica 40, 2004, section 2).
+/// In other coordinates T x of the state the matrices are T F T^-1, T G, H T^-1, D and T K, and nothing that can be
+/// measured changes. So of all entries n^2 can be held, and what is estimated is how the others vary: as the free
+/// entries of a canonical form do. Which entries are held is chosen so that the covariance of the others is well
+/// conditioned. Poles, gains and responses have the errors that follow from it, whatever the choice; an entry by itself
+/// has none (McKelvey, Helmersson and Ribarits, Automatica 40, 2004, section 2).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EntryCovariance {
     /// The entries that vary, all others being held: n (m + 2 l), and those of D where it was estimated.
@@ -144,7 +145,8 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// How the response h (q I - F)^-1 g + d moves with an entry, with weights w' = h (q I - F)^-1 and states v = (q I - F)^-1 g:
+    /// How the response h (q I - F)^-1 g + d moves with an entry, with weights w' = h (q I - F)^-1 and states v = (q
+    /// I - F)^-1 g:
     ///
     /// ```text
     /// dh v + w' dF v + w' dg + dd
@@ -170,15 +172,17 @@ impl Path {
 }
 
 impl EntryCovariance {
-    /// The covariance of a model's entries from `factor`, all of whose columns are variations of the [`flat`] entries: their covariance is
-    /// the product of it with its transpose, along changes of coordinates whatever it may be. With N the basis that is
-    /// [across coordinates](across_coordinates), N' is the same for a variation and for one of the free entries alone,
+    /// The covariance of a model's entries from `factor`, all of whose columns are variations of the [`flat`] entries:
+    /// their covariance is the product of it with its transpose, along changes of coordinates whatever it may be. With
+    /// N the basis that is [across coordinates](across_coordinates), N' is the same for a variation and for one of the
+    /// free entries alone,
     ///
     /// ```text
     /// N_S' b = N' d
     /// ```
     ///
-    /// N_S being its rows of the free entries: those that a QR factor of N' with pivots takes first. None where that fails.
+    /// N_S being its rows of the free entries: those that a QR factor of N' with pivots takes first. None where that
+    /// fails.
     pub(crate) fn new(
         model: &StateSpace,
         feedthrough: bool,
@@ -249,7 +253,8 @@ impl EntryCovariance {
         })
     }
 
-    /// The same of a model whose inputs wait: see [`StateSpace::delayed`]. What an input does is then what the last of its states does.
+    /// The same of a model whose inputs wait: see [`StateSpace::delayed`]. What an input does is then what the last of
+    /// its states does.
     pub(super) fn delayed(mut self, states: usize, delays: &[usize]) -> Self {
         for entry in &mut self.entries {
             let waits = |matrix| matches!(matrix, StateSpaceMatrix::G | StateSpaceMatrix::D);
@@ -266,7 +271,8 @@ impl EntryCovariance {
         self
     }
 
-    /// The model to either side along each of as many independent directions as it varies in, [`STEP`] standard deviations away.
+    /// The model to either side along each of as many independent directions as it varies in, [`STEP`] standard
+    /// deviations away.
     pub(in crate::model) fn varied(&self, model: &StateSpace) -> Option<Vec<[StateSpace; 2]>> {
         let moved = |direction: &DVector<f64>, sign: f64| {
             let mut moved = model.clone();
@@ -304,8 +310,8 @@ impl EntryCovariance {
         self.entries.iter().map(of).enumerate().collect()
     }
 
-    /// Gives static gains h M^-1 g + d, a list of those of all inputs for each output, the standard errors that follow: M is I - F of a sampled
-    /// model and -A in continuous time. None are given where M is singular.
+    /// Gives static gains h M^-1 g + d, a list of those of all inputs for each output, the standard errors that follow:
+    /// M is I - F of a sampled model and -A in continuous time. None are given where M is singular.
     pub(super) fn spread_gains(
         &self,
         gains: &mut [Vec<Option<Quantity>>],
@@ -366,8 +372,8 @@ pub(in crate::model) fn independent(covariance: &[Vec<f64>]) -> Option<Vec<DVect
     Some(seen.map(direction).collect())
 }
 
-/// The rows that a QR factor of the transpose takes first, as many as there are columns: of what the rows taken before leave, each
-/// time the largest. None if those of the basis depend on one another.
+/// The rows that a QR factor of the transpose takes first, as many as there are columns: of what the rows taken before
+/// leave, each time the largest. None if those of the basis depend on one another.
 fn pivots(basis: &DMatrix<f64>, rank: usize) -> Option<Vec<usize>> {
     let mut left = basis.transpose();
     let mut taken = Vec::with_capacity(rank);
@@ -385,15 +391,15 @@ fn pivots(basis: &DMatrix<f64>, rank: usize) -> Option<Vec<usize>> {
     Some(taken)
 }
 
-/// Gives the roots that are eigenvalues of `matrix` the covariances that follow, `slope` saying how an entry of the model moves it: for a
-/// simple eigenvalue with right and left eigenvectors v and w
+/// Gives the roots that are eigenvalues of `matrix` the covariances that follow, `slope` saying how an entry of the
+/// model moves it: for a simple eigenvalue with right and left eigenvectors v and w
 ///
 /// ```text
 /// d lambda = w' dM v/(w' v)
 /// ```
 ///
-/// (Stewart and Sun, Matrix Perturbation Theory, 1990, theorem IV.2.3). Those that have another one within four of their standard
-/// deviations have none, and those of states that wait. O(n^3) for each.
+/// (Stewart and Sun, Matrix Perturbation Theory, 1990, theorem IV.2.3). Those that have another one within four of
+/// their standard deviations have none, and those of states that wait. O(n^3) for each.
 pub(super) fn spread(
     roots: &mut [Root],
     matrix: &DMatrix<f64>,

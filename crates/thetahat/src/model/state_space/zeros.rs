@@ -48,12 +48,13 @@ struct Channel {
 }
 
 impl StateSpace {
-    /// The eigenvalues of F: poles of what is between inputs, innovations and outputs. Largest first; of a conjugate pair the positive
-    /// imaginary part first. A pole of multiplicity k at 0 is k exact zeros. O(n^3), and as much again for each pole at 0.
+    /// The eigenvalues of F: poles of what is between inputs, innovations and outputs. Largest first; of a conjugate
+    /// pair the positive imaginary part first. A pole of multiplicity k at 0 is k exact zeros. O(n^3), and as much
+    /// again for each pole at 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] for matrices whose shapes do not fit, or that are not finite; [`Error::Undetermined`] where the eigenvalues do not
-    /// converge.
+    /// [`Error::Argument`] for matrices whose shapes do not fit, or that are not finite; [`Error::Undetermined`] where
+    /// the eigenvalues do not converge.
     ///
     /// ```
     /// use thetahat::model::StateSpace;
@@ -80,24 +81,25 @@ impl StateSpace {
 
     /// The transfer function W(z) = h (z I - F)^-1 g + d from an input to an output, both counted from 0.
     ///
-    /// States that this input does not reach, or this output does not see, are left out first, by reflections to Hessenberg form
-    /// (Van Dooren, IEEE Trans. Automatic Control 26, 1981, "The generalized eigenstructure problem in linear system theory"), so that
-    /// poles of other channels are not among its poles. Then, while d = 0, with coordinates in which h = [eta 0 … 0]:
+    /// States that this input does not reach, or this output does not see, are left out first, by reflections to
+    /// Hessenberg form (Van Dooren, IEEE Trans. Automatic Control 26, 1981, "The generalized eigenstructure problem in
+    /// linear system theory"), so that poles of other channels are not among its poles. Then, while d = 0, with
+    /// coordinates in which h = [eta 0 … 0]:
     ///
     /// ```text
     /// y(t+1) = eta x_1(t+1) = eta (F_1 x(t) + g_1 u(t)),   x_1 = 0 as long as y is
     /// ```
     ///
-    /// that is, W(z) (z - zeros) is eta times that of x_2, x_3, … with h = F_12, …, F_1n and d = g_1, which has the same zeros
-    /// (Emami-Naeini and Van Dooren, Automatica 18, 1982). With d at last other than 0 they are the z at which [F - z I, g; h, d] loses
-    /// rank: not eigenvalues of F - g h / d, which a small d would spoil, but of the pencil that is left when reflections take [h, d] to
-    /// [0, delta]. A zero or pole of multiplicity k at 0 is k exact zeros. The states are first scaled by powers of two so that their rows
-    /// and columns have about the same size (Parlett and Reinsch, Numerische Mathematik 13, 1969). O(n^3), and as much again for each zero
-    /// or pole at 0.
+    /// that is, W(z) (z - zeros) is eta times that of x_2, x_3, … with h = F_12, …, F_1n and d = g_1, which has the
+    /// same zeros (Emami-Naeini and Van Dooren, Automatica 18, 1982). With d at last other than 0 they are the z at
+    /// which [F - z I, g; h, d] loses rank: not eigenvalues of F - g h / d, which a small d would spoil, but of the
+    /// pencil that is left when reflections take [h, d] to [0, delta]. A zero or pole of multiplicity k at 0 is k exact
+    /// zeros. The states are first scaled by powers of two so that their rows and columns have about the same size
+    /// (Parlett and Reinsch, Numerische Mathematik 13, 1969). O(n^3), and as much again for each zero or pole at 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] for an output or input that the model does not have, and for matrices whose shapes do not fit or that are
-    /// not finite; [`Error::Undetermined`] where the eigenvalues do not converge.
+    /// [`Error::Argument`] for an output or input that the model does not have, and for matrices whose shapes do not
+    /// fit or that are not finite; [`Error::Undetermined`] where the eigenvalues do not converge.
     ///
     /// ```
     /// use thetahat::model::StateSpace;
@@ -147,7 +149,8 @@ impl StateSpace {
 }
 
 impl Channel {
-    /// With each state in a unit, a power of two, in which what it does and what is done to it have about the same size.
+    /// With each state in a unit, a power of two, in which what it does and what is done to it have about the same
+    /// size.
     fn scaled(mut self) -> Self {
         let size = self.f.nrows();
         for _ in 0..SWEEPS {
@@ -194,8 +197,8 @@ impl Channel {
         Self { f: self.f.transpose(), g: self.h, h: self.g, d: self.d }
     }
 
-    /// In coordinates in which g has one entry and F is an upper Hessenberg matrix: from the first zero below its diagonal on, no state is
-    /// reached.
+    /// In coordinates in which g has one entry and F is an upper Hessenberg matrix: from the first zero below its
+    /// diagonal on, no state is reached.
     fn reached(mut self) -> Self {
         let size = self.f.nrows();
         let (driven, moved) = (eigen::rounding(size) * self.g.norm(), eigen::rounding(size) * self.f.norm());

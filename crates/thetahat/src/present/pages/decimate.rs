@@ -1,8 +1,8 @@
 //! Fewer points for the same picture.
 //!
-//! The rows are cut into as many equal segments as the picture can show. Of each only the smallest and the largest value
-//! stay, in their order: no peak is lost, as it would be by leaving out samples, or made smaller, as by averaging (Steinarsson
-//! 2013, Downsampling Time Series for Visual Representation, section 2).
+//! The rows are cut into as many equal segments as the picture can show. Of each only the smallest and the largest
+//! value stay, in their order: no peak is lost, as it would be by leaving out samples, or made smaller, as by averaging
+//! (Steinarsson 2013, Downsampling Time Series for Visual Representation, section 2).
 
 /// Digits beyond this are below a pixel.
 const DIGITS: i32 = 7;
@@ -22,8 +22,8 @@ struct Kept {
     gaps: usize,
 }
 
-/// At most about `points` points of a signal, its first and last value among them. The line is interrupted where values are
-/// missing and where the clock steps back or by more than `longest`. A signal of no more rows stays as it is.
+/// At most about `points` points of a signal, its first and last value among them. The line is interrupted where values
+/// are missing and where the clock steps back or by more than `longest`. A signal of no more rows stays as it is.
 pub(super) fn decimate(time: &[f64], values: &[f64], points: usize, longest: f64) -> Curve {
     let rows = time.len().min(values.len());
     let usable = |row: &usize| values[*row].is_finite() && time[*row].is_finite();

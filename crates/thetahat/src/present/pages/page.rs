@@ -10,8 +10,8 @@ use crate::text::is_invisible;
 const LIBRARY: &str = include_str!("plotly/plotly-basic.min.js");
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("page.js");
-/// Up to the title. The policy forbids every request, and every script but these two, which it knows by the SHA-256 of what stands
-/// between their tags.
+/// Up to the title. The policy forbids every request, and every script but these two, which it knows by the SHA-256 of
+/// what stands between their tags.
 const HEAD: &str = r#"<!DOCTYPE html>
 <html lang="en">
 <head>

@@ -7,8 +7,8 @@ use crate::figures::{fixed, seconds};
 use crate::model::LinearModel;
 use crate::spectrum::{Agreement, MeasuredResponse};
 
-/// The page of a measured response: magnitude, phase and coherence from each input with their bands, models over them, and the spectrum
-/// of the noise. `command` is shown as what made the page.
+/// The page of a measured response: magnitude, phase and coherence from each input with their bands, models over them,
+/// and the spectrum of the noise. `command` is shown as what made the page.
 pub fn response_page(
     found: &MeasuredResponse,
     models: &[(String, &LinearModel<'_>)],

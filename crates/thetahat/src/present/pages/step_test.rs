@@ -15,8 +15,8 @@ const MOST: usize = 12;
 /// A chart begins this fraction of the response before the step.
 const BEFORE: f64 = 0.15;
 
-/// The page of a step test: the log with its steps, each response with what is read off it, and the figures by each way. `log` is the one
-/// that was evaluated, none for a frequency response. `command` is shown as what made the page.
+/// The page of a step test: the log with its steps, each response with what is read off it, and the figures by each
+/// way. `log` is the one that was evaluated, none for a frequency response. `command` is shown as what made the page.
 pub fn step_test_page(found: &StepTest, log: Option<&Log>, command: &str) -> String {
     let title = format!("Step test of {}{}", found.output, of(&found.logs));
     let mut page = Page::new(title, command, &found.generator);
@@ -48,8 +48,8 @@ pub fn step_test_page(found: &StepTest, log: Option<&Log>, command: &str) -> Str
     page.write()
 }
 
-/// The page of what a model does after a step or an impulse of each input, one entry for each output. `samples` are those of
-/// the chart; none: until it has settled. `name` is what the model is called.
+/// The page of what a model does after a step or an impulse of each input, one entry for each output. `samples` are
+/// those of the chart; none: until it has settled. `name` is what the model is called.
 pub fn transient_page(
     models: &[&LinearModel<'_>],
     what: Transient,

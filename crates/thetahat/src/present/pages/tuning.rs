@@ -6,7 +6,8 @@ use super::text::or_dash;
 use crate::figures::{fixed, number};
 use crate::tune::Tuning;
 
-/// The page of settings of controllers: the closed loops side by side, and their figures. `command` is shown as what made the page.
+/// The page of settings of controllers: the closed loops side by side, and their figures. `command` is shown as what
+/// made the page.
 pub fn tuning_page(found: &Tuning, command: &str) -> String {
     let title = format!("Controllers from {} to {}", found.input, found.output);
     let mut page = Page::new(title, command, &found.generator);

@@ -40,7 +40,8 @@ impl Text {
         }
     }
 
-    /// Appends a table, what its signs mean, and an empty line. What is too wide goes on below, the first column again in front.
+    /// Appends a table, what its signs mean, and an empty line. What is too wide goes on below, the first column again
+    /// in front.
     pub(super) fn table(&mut self, table: Table) {
         for (position, columns) in table.blocks(self.layout.width).into_iter().enumerate() {
             if position > 0 {

@@ -6,7 +6,8 @@ use crate::report::{Plan, Report, StateSpacePlan, ValidationPlan, fit_state_spac
 use crate::respond::{Horizon, InitialCondition};
 use crate::{Document, Error};
 
-/// A plant with poles at 0.95 and 0.8 whose input changes every fifth sample, with noise of its state and its sensor, every `step`-th row.
+/// A plant with poles at 0.95 and 0.8 whose input changes every fifth sample, with noise of its state and its sensor,
+/// every `step`-th row.
 fn log(step: usize) -> Result<Log, Error> {
     let mut noise = Noise(4);
     let (mut u, mut y, mut x, mut held) = (Vec::new(), Vec::new(), [0.0, 0.0], 0.0);

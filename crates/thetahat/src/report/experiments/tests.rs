@@ -8,7 +8,8 @@ use crate::estimate::{Constant, Initial};
 use crate::model::Orders;
 use crate::report::identify;
 
-/// x(t) = 1.5 x(t-1) - 0.7 x(t-2) + u(t-1) + 0.5 u(t-2) from a state of its own, seen 3 higher with noise: e, or e + 0.6 e(t-1).
+/// x(t) = 1.5 x(t-1) - 0.7 x(t-2) + u(t-1) + 0.5 u(t-2) from a state of its own, seen 3 higher with noise: e, or e +
+/// 0.6 e(t-1).
 fn log(seed: u64, rows: usize, colour: f64) -> Log {
     let mut random = Random::of(seed, 1);
     let u: Vec<f64> = (0..rows).map(|_| random.normal() + 2.0).collect();

@@ -1,7 +1,7 @@
 //! The process with an integrator that a default choice may come to: a level that follows the sum of its input.
 //!
-//! A pole that was searched for ends near 1 and never on it; then the gain at rest is a large number that means nothing. A process with an
-//! integrator has the pole where it is, and its gain for each second.
+//! A pole that was searched for ends near 1 and never on it; then the gain at rest is a large number that means
+//! nothing. A process with an integrator has the pole where it is, and its gain for each second.
 
 use thetahat_numerics::optimize::Monitor;
 use thetahat_numerics::regression::sum;
@@ -21,7 +21,8 @@ const STRUCTURES: [&str; 3] = ["p0di", "p1di", "p2di"];
 const LENGTHS: f64 = 0.5;
 /// So many standard errors from 1 a pole may be on it.
 const CERTAIN: f64 = 3.0;
-/// The mean square of the errors of a process may be this many times that of the polynomial model, which has more parameters.
+/// The mean square of the errors of a process may be this many times that of the polynomial model, which has more
+/// parameters.
 const CLOSE: f64 = 1.1;
 /// The same beside a model whose noise integrates.
 const FAR: f64 = 0.5;
@@ -40,9 +41,8 @@ impl<'l> Integrating<'l> {
         open.then_some(Self { log, plan: own })
     }
 
-    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, or far closer than one whose noise
-    /// integrates, and why it is taken; none of other models,
-    /// and where no process comes as close.
+    /// The process that is as close to the log as a polynomial model with a pole that may be on 1, or far closer than
+    /// one whose noise integrates, and why it is taken; none of other models, and where no process comes as close.
     ///
     /// # Errors
     /// [`Error::Interrupted`] if the monitor says so.

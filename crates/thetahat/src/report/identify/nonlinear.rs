@@ -1,8 +1,9 @@
 //! The nonlinear ARX model that a default choice may come to.
 //!
-//! Products of two past values, and of three where these help, are chosen by forward regression for a few sets of lags, without each third
-//! of the rows, and evaluated on it by their free run, as the linear models are. The best of them is taken where it is far better than all
-//! linear ones: most plants are near enough to linear ones where they work, and a linear model says more.
+//! Products of two past values, and of three where these help, are chosen by forward regression for a few sets of lags,
+//! without each third of the rows, and evaluated on it by their free run, as the linear models are. The best of them is
+//! taken where it is far better than all linear ones: most plants are near enough to linear ones where they work, and a
+//! linear model says more.
 
 use std::ops::Range;
 
@@ -30,7 +31,8 @@ const UNITS: usize = 2;
 const STARTS: usize = 2;
 const ITERATIONS: usize = 200;
 const RIDGE: f64 = 0.1;
-/// Without a block networks are trained on so many samples at most, in a few pieces; the one that is taken on no more than these.
+/// Without a block networks are trained on so many samples at most, in a few pieces; the one that is taken on no more
+/// than these.
 const TRAINED: usize = 2000;
 const PIECES: usize = 2;
 const MOST_TRAINED: usize = 20_000;
@@ -166,7 +168,8 @@ impl<'l> Nonlinear<'l> {
         rivals
     }
 
-    /// Whether the free run keeps to the range of the output where all inputs rest at the least and at the largest value that they had.
+    /// Whether the free run keeps to the range of the output where all inputs rest at the least and at the largest
+    /// value that they had.
     ///
     /// # Errors
     /// As for [`Log::new`].

@@ -33,7 +33,8 @@ fn driven(u: &[f64], size: f64, seed: u64) -> Vec<f64> {
     each.collect()
 }
 
-/// A step test from rest: this many rows each at 0, 40, 10 and 60, the output 0.9 times the one before and 0.05 times the input.
+/// A step test from rest: this many rows each at 0, 40, 10 and 60, the output 0.9 times the one before and 0.05 times
+/// the input.
 fn step_test(seed: u64, size: f64) -> (Vec<f64>, Vec<f64>) {
     let u: Vec<f64> = [0.0, 40.0, 10.0, 60.0].into_iter().flat_map(|u| vec![u; 40]).collect();
     let mut noise = Noise(seed);
@@ -328,7 +329,8 @@ fn what_is_open_of_the_offset_goes_with_the_model() {
         let open = |y: &[f64], plan: &Plan| {
             fitted(&u, y, plan).polynomials().offset_covariance.clone().map(|open| open.covariance)
         };
-        // Estimated, around zero and around another level: the matrix is the same, and that of the parameters is a part of it.
+        // Estimated, around zero and around another level: the matrix is the same, and that of the parameters is a part
+        // of it.
         let yes = Plan { detrend: Detrend::None, method: method.clone(), ..plan(&orders) };
         let (low, high) = (open(&y, &yes).unwrap(), open(&raised, &yes).unwrap());
         let count = orders.parameters();

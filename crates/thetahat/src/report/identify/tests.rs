@@ -80,7 +80,8 @@ fn the_largest_is_found_in_any_place() {
     }
 }
 
-/// Six lightly damped modes of a plant whose input is held for three samples, and white noise a tenth as large as what they do.
+/// Six lightly damped modes of a plant whose input is held for three samples, and white noise a tenth as large as what
+/// they do.
 fn modes() -> Result<Log, Error> {
     let mut noise = Noise(11);
     let (moved, e) = (noise.take(1200), noise.take(1200));

@@ -59,7 +59,8 @@ pub enum MapPlan {
         /// Whether a constant and the regressors themselves are functions too.
         linear: bool,
     },
-    /// A natural cubic spline of each regressor: a constant and the regressors themselves, and bends of which forward regression chooses.
+    /// A natural cubic spline of each regressor: a constant and the regressors themselves, and bends of which forward
+    /// regression chooses.
     Spline {
         /// Bends of each regressor, at knots that divide its range over the estimation rows evenly.
         units: usize,
@@ -77,10 +78,11 @@ pub enum MapPlan {
     Network {
         /// What its units make of their sums.
         activation: Activation,
-        /// How many units; none: `select` says it, of 2, 4 and 8. Of units that are drawn, from how many forward regression chooses.
+        /// How many units; none: `select` says it, of 2, 4 and 8. Of units that are drawn, from how many forward
+        /// regression chooses.
         units: Option<usize>,
-        /// Whether the weights of the hidden layer are drawn, and forward regression chooses among the units: else all weights are
-        /// trained. Steps, which have no slope, are always drawn.
+        /// Whether the weights of the hidden layer are drawn, and forward regression chooses among the units: else all
+        /// weights are trained. Steps, which have no slope, are always drawn.
         drawn: bool,
     },
     /// Radial basis functions beside a linear path, whose centres and widths are trained.
@@ -88,8 +90,9 @@ pub enum MapPlan {
         /// How many; none: `select` says it, of 2, 4 and 8.
         units: Option<usize>,
     },
-    /// What has the best free run on rows held out: the linear model that the data choose, polynomials of degree 2 and 3, and networks of 2
-    /// and 4 units. The first whose error is no more than 1.1 times the least is the report: a linear model where it is about as good.
+    /// What has the best free run on rows held out: the linear model that the data choose, polynomials of degree 2 and
+    /// 3, and networks of 2 and 4 units. The first whose error is no more than 1.1 times the least is the report: a
+    /// linear model where it is about as good.
     Auto,
     /// The samples nearest to the regressors.
     Neighbours {
@@ -146,15 +149,16 @@ pub struct NonlinearArxPlan {
     pub inputs: Vec<String>,
     /// The output channels: a map for each, of the lags of all.
     pub outputs: Vec<String>,
-    /// Expressions of these channels that are regressors too, such as sqrt(u), of their values in their own units. Each is read at the lags
-    /// that all channels in it have: from the longest of their delays to the longest of their lags.
+    /// Expressions of these channels that are regressors too, such as sqrt(u), of their values in their own units. Each
+    /// is read at the lags that all channels in it have: from the longest of their delays to the longest of their lags.
     pub expressions: Vec<String>,
     /// Rows to estimate on; none: all.
     pub estimate: Vec<Rows>,
     /// Rows to validate on.
     pub validate: Vec<Rows>,
-    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is fitted again to the
-    /// first two, and judged on the third. None: where trained models are compared, and no rows are to validate on, 70/30/0.
+    /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is
+    /// fitted again to the first two, and judged on the third. None: where trained models are compared, and no rows are
+    /// to validate on, 70/30/0.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -164,7 +168,8 @@ pub struct NonlinearArxPlan {
     pub output_lags: Vec<usize>,
     /// What is read of each input.
     pub input_lags: Vec<InputLags>,
-    /// Whether those of the linear model that the data choose are tried, too, and taken where the model runs better on rows held out.
+    /// Whether those of the linear model that the data choose are tried, too, and taken where the model runs better on
+    /// rows held out.
     pub lags_chosen: bool,
     /// The functions.
     pub map: MapPlan,
@@ -172,14 +177,14 @@ pub struct NonlinearArxPlan {
     pub terms: Option<usize>,
     /// How many functions a choice looks at; none: 40, and 10 local models.
     pub most: Option<usize>,
-    /// What makes one number of functions better than another; none: the free run on the validation rows where there are some, else that
-    /// on five blocks of the estimation rows.
+    /// What makes one number of functions better than another; none: the free run on the validation rows where there
+    /// are some, else that on five blocks of the estimation rows.
     pub select: Option<Select>,
-    /// Keeps parameters small: weighs like this many more samples in which the output is 0. None: nothing, and of trained
-    /// numbers 0.1 or 1, as `select` says.
+    /// Keeps parameters small: weighs like this many more samples in which the output is 0. None: nothing, and of
+    /// trained numbers 0.1 or 1, as `select` says.
     pub ridge: Option<f64>,
-    /// Of which errors parameters are to be the least: one step ahead, so many, or of the free run. None: one step ahead, and of trained
-    /// maps the free run where there are inputs.
+    /// Of which errors parameters are to be the least: one step ahead, so many, or of the free run. None: one step
+    /// ahead, and of trained maps the free run where there are inputs.
     pub focus: Option<Horizon>,
     /// How to search, where more is to be found than one solution says.
     pub search: Search,
@@ -188,7 +193,8 @@ pub struct NonlinearArxPlan {
 }
 
 impl NonlinearArxPlan {
-    /// All rows, means removed, products of at most two of two past values of each output and of each input; further settings as fields.
+    /// All rows, means removed, products of at most two of two past values of each output and of each input; further
+    /// settings as fields.
     pub fn new(inputs: &[&str], outputs: &[&str]) -> Self {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         Self {

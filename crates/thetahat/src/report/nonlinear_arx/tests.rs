@@ -13,7 +13,8 @@ use crate::report::{Plan, ValidationPlan, fit_nonlinear_arx, identify, validate}
 use crate::respond::InitialCondition;
 use crate::select::Select;
 
-/// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of 0.05.
+/// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of
+/// 0.05.
 fn log(rows: usize, seed: u64, square: f64, cube: f64) -> Log {
     let mut noise = Noise(seed);
     let u = noise.take(rows);

@@ -9,7 +9,8 @@ use crate::data::Log;
 /// A row: a value of each channel, none where it is missing.
 type Row = Vec<Option<f64>>;
 
-/// Where some pieces that follow one another begin and end. Each keeps as many rows as the model reaches back to, or as it has of them.
+/// Where some pieces that follow one another begin and end. Each keeps as many rows as the model reaches back to, or as
+/// it has of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub(super) struct Border {
     /// How many rows before the first one of their own there are.

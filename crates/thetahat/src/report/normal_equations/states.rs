@@ -15,7 +15,8 @@ use crate::estimate::{
 use crate::model::Signal;
 use crate::respond::InitialCondition;
 
-/// With the offsets of all pieces, the orders and the coupling of the least MDL among those that were asked for, and levels likewise.
+/// With the offsets of all pieces, the orders and the coupling of the least MDL among those that were asked for, and
+/// levels likewise.
 pub(super) fn arx(sums: &NormalEquations, delays: &[usize], arx: &VectorArxOptions) -> Result<Report, Error> {
     let signals = signals(sums)?;
     let outputs = signals.len() - delays.len();
@@ -37,7 +38,8 @@ pub(super) fn arx(sums: &NormalEquations, delays: &[usize], arx: &VectorArxOptio
     report(sums, found, signals, delays, &spreads)
 }
 
-/// With these offsets, the past of the least AIC and the order of the least MDL unless they are given, and levels likewise.
+/// With these offsets, the past of the least AIC and the order of the least MDL unless they are given, and levels
+/// likewise.
 pub(super) fn subspace(
     sums: &NormalEquations,
     delays: &[usize],

@@ -12,23 +12,26 @@ use crate::respond::FrequencyResponse;
 use crate::spectrum::MeasuredResponse;
 use crate::{Document, Error};
 
-/// Finds the process whose frequency response, with an input that is held from sample to sample, comes closest to a measured one:
+/// Finds the process whose frequency response, with an input that is held from sample to sample, comes closest to a
+/// measured one:
 ///
 /// ```text
 /// min sum_k |G(omega_k) - G_k|^2/var G_k
 /// ```
 ///
-/// with the variances of the points; where a point has none, with |G_k|^2 in their place: errors relative to each point. Of the
-/// plan it takes the inputs, none standing for all of them, the structures and the search. Levels are not in a response: offsets are zero.
+/// with the variances of the points; where a point has none, with |G_k|^2 in their place: errors relative to each
+/// point. Of the plan it takes the inputs, none standing for all of them, the structures and the search. Levels are not
+/// in a response: offsets are zero.
 ///
-/// Standard errors are those of independent points with these variances, and larger where the response misses the points by more.
+/// Standard errors are those of independent points with these variances, and larger where the response misses the
+/// points by more.
 ///
-/// Source: Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, section 9.11; Ljung, System
-/// Identification, 2nd ed. 1999, section 7.7.
+/// Source: Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, section 9.11;
+/// Ljung, System Identification, 2nd ed. 1999, section 7.7.
 ///
 /// # Errors
-/// [`Error::Argument`] for what a response does not have (rows, offsets, a slope, a start), and an input that it does not; otherwise as
-/// for [`fit_process`](super::fit_process).
+/// [`Error::Argument`] for what a response does not have (rows, offsets, a slope, a start), and an input that it does
+/// not; otherwise as for [`fit_process`](super::fit_process).
 ///
 /// ```
 /// use std::ops::ControlFlow;

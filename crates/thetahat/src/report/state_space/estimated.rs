@@ -1,4 +1,5 @@
-//! Matrices from a record, or from sums over parts of one: by a subspace method, with a search behind it, or as an ARX model.
+//! Matrices from a record, or from sums over parts of one: by a subspace method, with a search behind it, or as an ARX
+//! model.
 
 use std::ops::RangeInclusive;
 
@@ -89,7 +90,8 @@ pub(super) fn by_arx(
     of_arx(find, exact, delays, constant)
 }
 
-/// The same that `find` finds with a constant or without, whose errors `exact` says where products of signals do not tell them from none.
+/// The same that `find` finds with a constant or without, whose errors `exact` says where products of signals do not
+/// tell them from none.
 pub(in crate::report) fn of_arx(
     find: impl Fn(bool) -> Result<VectorArxEstimate, Error>,
     exact: impl Fn(&VectorArxEstimate) -> Result<DMatrix<f64>, Error>,
@@ -160,7 +162,8 @@ pub(super) fn by_subspace(
     Ok(of_order(found, &plan.subspace, (matrices, levels), searched, (samples, degrees, mean)))
 }
 
-/// The states that sums over parts of a record tell of, and the norm of each output about its mean over the samples that have errors.
+/// The states that sums over parts of a record tell of, and the norm of each output about its mean over the samples
+/// that have errors.
 pub(in crate::report) fn by_sums(
     sums: &SubspaceSums<'_>,
     (options, orders): (&SubspaceOptions, Option<&RangeInclusive<usize>>),
@@ -191,7 +194,8 @@ fn degrees_of_order(
     degrees(&format!("a model of order {order}"), free, samples, outputs)
 }
 
-/// The model of an order with these matrices and levels, whose errors have this mean over so many samples, with so many degrees of freedom.
+/// The model of an order with these matrices and levels, whose errors have this mean over so many samples, with so many
+/// degrees of freedom.
 fn of_order(
     Ordered { subspace: found, order, scores, .. }: Ordered,
     options: &SubspaceOptions,
@@ -224,7 +228,8 @@ fn of_order(
     }
 }
 
-/// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has no such model.
+/// A model of another weighting to start from: what is near the one minimum may be far from another. None where it has
+/// no such model.
 fn other_start(
     record: &JointRecord<'_>,
     found: &Subspace,
@@ -244,8 +249,9 @@ fn other_start(
     Some(RefinementStart { name: weighting.to_string(), model, levels })
 }
 
-/// The model of one output in polynomials whose errors are least, of the free run or one step ahead: what a subspace method finds may
-/// be far from it. None of several outputs, of no input, or where the search fails. Its level is that of another start.
+/// The model of one output in polynomials whose errors are least, of the free run or one step ahead: what a subspace
+/// method finds may be far from it. None of several outputs, of no input, or where the search fails. Its level is that
+/// of another start.
 ///
 /// # Errors
 /// [`Error::Interrupted`].

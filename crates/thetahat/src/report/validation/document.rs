@@ -50,8 +50,8 @@ pub struct Validation {
     pub noise: Vec<NoiseLevel>,
     /// How often the measured outputs lie in the prediction intervals.
     pub coverage: Vec<Coverage>,
-    /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of another size in each
-    /// row: of theirs each is divided by its standard deviation.
+    /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of
+    /// another size in each row: of theirs each is divided by its standard deviation.
     pub residuals: Vec<Residuals>,
     /// Whether the residuals of several outputs are white together (Hosking 1980); none of one output.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -60,7 +60,8 @@ pub struct Validation {
     /// constant; not of models in equations.
     #[serde(default)]
     pub nonlinear: Vec<Nonlinearity>,
-    /// How the model agrees with a measured frequency response, for each input that both have, where one was laid beside it.
+    /// How the model agrees with a measured frequency response, for each input that both have, where one was laid
+    /// beside it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub response: Vec<Agreement>,
     /// What a careful reader should know, in plain words.
@@ -88,7 +89,8 @@ pub struct NoiseLevel {
     pub mse: Option<f64>,
     /// The variance of e in the model; the mean of them where it expects another in each row.
     pub model: f64,
-    /// The first over the second, or the mean of e^2 over the variance of the row: 1 where the log is like the one of the fit.
+    /// The first over the second, or the mean of e^2 over the variance of the row: 1 where the log is like the one of
+    /// the fit.
     pub ratio: Option<f64>,
 }
 
@@ -116,8 +118,8 @@ pub struct Comparison {
     pub generator: String,
     /// The models in the order they were given.
     pub models: Vec<Validation>,
-    /// The information criteria of their fits, in the same order; none where they were not fitted to the same values of the same
-    /// outputs, or the samples that count differ by more than one in twenty.
+    /// The information criteria of their fits, in the same order; none where they were not fitted to the same values of
+    /// the same outputs, or the samples that count differ by more than one in twenty.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub criteria: Option<Vec<Criteria>>,
 }

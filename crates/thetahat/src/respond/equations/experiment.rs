@@ -30,8 +30,8 @@ pub(crate) struct Experiment {
 
 /// An experiment for each of the joined logs that has some of the rows. A log without a clock has the model's.
 ///
-/// It begins, in the state that the model says, with the first of the rows that the model was fitted to, if they are in this log and
-/// stand before those asked for; else with the first row of the log.
+/// It begins, in the state that the model says, with the first of the rows that the model was fitted to, if they are in
+/// this log and stand before those asked for; else with the first row of the log.
 ///
 /// # Errors
 /// [`Error::Data`] for a channel that is not there, and a step that the model cannot take.
@@ -136,7 +136,8 @@ impl Experiment {
         &self.outputs[row * self.height..(row + 1) * self.height]
     }
 
-    /// The steps to a row, each as its time and its seconds; none for the first row. The input is that of the row before.
+    /// The steps to a row, each as its time and its seconds; none for the first row. The input is that of the row
+    /// before.
     pub(crate) fn steps(&self, row: usize) -> impl Iterator<Item = (f64, f64)> {
         let step = row.checked_sub(1).and_then(|before| self.times.get(before).zip(self.steps.get(before)));
         step.into_iter().flat_map(|(&time, &(count, length))| {

@@ -1,14 +1,15 @@
 //! The model on its own: driven by the inputs from a start.
 //!
-//! What is known of the state in the first row is N(m, P), P = L L'. The start is the one that explains the outputs best without
-//! any noise inside, what is known of it before included:
+//! What is known of the state in the first row is N(m, P), P = L L'. The start is the one that explains the outputs
+//! best without any noise inside, what is known of it before included:
 //!
 //! ```text
 //! x0 = m + L s,   s = argmin sum (y - h(x))^2/r + |s|^2,   x(k+1) = f(x(k))
 //! ```
 //!
-//! by Levenberg and Marquardt's method with the exact slopes dx(k)/ds = F(k-1) … F(0) L. A state that is known (a row of zeros in L)
-//! stays as it is. In the first row of a log the model says m and P, in a later one the filter up to there.
+//! by Levenberg and Marquardt's method with the exact slopes dx(k)/ds = F(k-1) … F(0) L. A state that is known (a row
+//! of zeros in L) stays as it is. In the first row of a log the model says m and P, in a later one the filter up to
+//! there.
 
 use std::ops::Range;
 
@@ -44,8 +45,8 @@ pub(crate) struct FreeRun {
     pub(crate) outputs: Vec<f64>,
 }
 
-/// A run through each segment of rows that count. None where a response leaves the range of numbers. O(N (n^3 + m n^2)) for each of
-/// a few iterations.
+/// A run through each segment of rows that count. None where a response leaves the range of numbers. O(N (n^3 + m n^2))
+/// for each of a few iterations.
 pub(crate) fn free_run(
     model: &GreyBox,
     experiment: &Experiment,
@@ -178,7 +179,8 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// The sum of squares from a start, and the normal equations there if it is told by s; none where a number is not finite.
+    /// The sum of squares from a start, and the normal equations there if it is told by s; none where a number is not
+    /// finite.
     fn run(&mut self, start: &[f64], s: Option<&DVector<f64>>) -> Option<f64> {
         let (n, m) = (self.model.states().len(), self.model.outputs().len());
         self.state.copy_from_slice(start);

@@ -132,8 +132,9 @@ impl<'l> EquationsOnLog<'l> {
         signals
     }
 
-    /// The rows that count so many steps ahead, for each output: those that a measurement stands as many rows before. The others are predicted
-    /// from the state that the model begins with, which is no prediction from data. An output of which no other row is left keeps them.
+    /// The rows that count so many steps ahead, for each output: those that a measurement stands as many rows before.
+    /// The others are predicted from the state that the model begins with, which is no prediction from data. An output
+    /// of which no other row is left keeps them.
     fn predicted_from_measurements(&self, steps: usize) -> Vec<Vec<Range<usize>>> {
         let first = |experiment: &Experiment| -> Option<(Range<usize>, usize)> {
             let is_measured = |row: &usize| experiment.output(*row).iter().any(|value| !value.is_nan());
@@ -188,8 +189,8 @@ impl<'l> EquationsOnLog<'l> {
         each.collect()
     }
 
-    /// What `predict` says of an experiment with these parameters, and in the variances what is open of them: g' P g, with the slopes g
-    /// of the predictions by the parameters.
+    /// What `predict` says of an experiment with these parameters, and in the variances what is open of them: g' P g,
+    /// with the slopes g of the predictions by the parameters.
     fn with_open_parameters<P, D>(&self, log: usize, plain: P, dual: D) -> Result<Vec<Predicted<f64>>, Error>
     where
         P: Fn(&[f64]) -> Result<Vec<Predicted<f64>>, usize>,

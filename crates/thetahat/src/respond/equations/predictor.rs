@@ -7,18 +7,18 @@
 //! e = y - h(x),   S = H P H' + r,   x <- x + P H' e/S,   P <- P - P H' H P/S     H = dh/dx at the predicted state
 //! ```
 //!
-//! Elements of one measurement are used one after the other, all linearised about the predicted state, so that those after
-//! the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same operations give
-//! de/dz and dS/dz, exact but for rounding.
+//! Elements of one measurement are used one after the other, all linearised about the predicted state, so that those
+//! after the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same
+//! operations give de/dz and dS/dz, exact but for rounding.
 //!
 //! Time update: Thornton's modified weighted Gram-Schmidt on [F U | I] with the weights (D, Q). Measurement update:
-//! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, chapters V
-//! and VI).
+//! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
+//! chapters V and VI).
 //!
-//! thetahat-core updates the same factors by other arithmetic, made for plain numbers on small processors: reciprocals for divisions,
-//! four rows of U at a time, a threshold below which variances count as zero, and F P F' + Q factored anew where nothing cancels. Here
-//! derivatives take most of the time, and a branch on a threshold would be one more place where V is not smooth. The test
-//! `value_is_the_likelihood_of_the_filter` holds both to the same likelihood.
+//! thetahat-core updates the same factors by other arithmetic, made for plain numbers on small processors: reciprocals
+//! for divisions, four rows of U at a time, a threshold below which variances count as zero, and F P F' + Q factored
+//! anew where nothing cancels. Here derivatives take most of the time, and a branch on a threshold would be one more
+//! place where V is not smooth. The test `value_is_the_likelihood_of_the_filter` holds both to the same likelihood.
 
 use thetahat_core::Number;
 
@@ -157,8 +157,8 @@ impl<S: Number<f64>> Predictor<S> {
         self.origin.copy_from_slice(&self.state);
     }
 
-    /// Takes element `index` of the measurement, of variance `noise`. Gives its innovation; none where S is not positive
-    /// or a number not finite: then the filter is of no more use. 2 n^2 multiply-adds.
+    /// Takes element `index` of the measurement, of variance `noise`. Gives its innovation; none where S is not
+    /// positive or a number not finite: then the filter is of no more use. 2 n^2 multiply-adds.
     pub(crate) fn absorb(&mut self, index: usize, measured: f64, noise: f64) -> Option<Innovation<S>> {
         let (n, m) = (self.state.len(), self.output.len());
         let zero = S::from(0.0);

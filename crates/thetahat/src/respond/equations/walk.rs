@@ -50,8 +50,9 @@ pub(crate) fn reach<S: Number<f64>>(
     predictor.observe(model, z, experiment.input(row), experiment.times[row]);
 }
 
-/// Takes the filter to a row and through what was measured in it. `told` hears of each element: which output, the prediction h(x^), and
-/// e and S. Where the filter ceases to work in rows before those that count, it begins there again from the model's start.
+/// Takes the filter to a row and through what was measured in it. `told` hears of each element: which output, the
+/// prediction h(x^), and e and S. Where the filter ceases to work in rows before those that count, it begins there
+/// again from the model's start.
 pub(crate) fn step<S: Number<f64>>(
     model: &GreyBox,
     experiment: &Experiment,
@@ -87,8 +88,8 @@ fn absorb<S: Number<f64>>(
     predictor.is_finite().then_some(())
 }
 
-/// The filter over all logs. `told` hears of each element that was measured in a row that counts: where it is, the prediction
-/// h(x^), and e and S.
+/// The filter over all logs. `told` hears of each element that was measured in a row that counts: where it is, the
+/// prediction h(x^), and e and S.
 pub(crate) fn walk(
     model: &GreyBox,
     experiments: &[Experiment],
@@ -120,10 +121,10 @@ pub(crate) struct Predicted<S> {
     pub(crate) variance: S,
 }
 
-/// The outputs of each row of an experiment as they were expected `horizon` steps before, from all that was measured up to then:
-/// x^ and P of that row go on through the model. Nearer to the first row than that they go on from the model's start. One entry
-/// for each row and output, row after row; not a number in rows that do not count, and where the model leaves the range of numbers.
-/// O(N k (n^3 + m n^2)) for k steps.
+/// The outputs of each row of an experiment as they were expected `horizon` steps before, from all that was measured up
+/// to then: x^ and P of that row go on through the model. Nearer to the first row than that they go on from the model's
+/// start. One entry for each row and output, row after row; not a number in rows that do not count, and where the model
+/// leaves the range of numbers. O(N k (n^3 + m n^2)) for k steps.
 ///
 /// # Errors
 /// The row in which the filter ceases to work.
@@ -163,8 +164,9 @@ pub(crate) fn ahead<S: Number<f64>>(
     Ok(predicted)
 }
 
-/// The outputs of the `steps` rows after row `base` as they are expected from all that was measured up to it. After the end of the
-/// experiment the model goes on in its own sample time, which is for models without inputs. One entry for each row and output.
+/// The outputs of the `steps` rows after row `base` as they are expected from all that was measured up to it. After the
+/// end of the experiment the model goes on in its own sample time, which is for models without inputs. One entry for
+/// each row and output.
 ///
 /// # Errors
 /// As for [`ahead`].

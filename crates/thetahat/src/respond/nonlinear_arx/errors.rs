@@ -139,7 +139,8 @@ impl Errors {
     }
 }
 
-/// The places of the numbers of a map among all `count`. Those of trained functions come after the parameters, of one map.
+/// The places of the numbers of a map among all `count`. Those of trained functions come after the parameters, of one
+/// map.
 fn numbers(runner: &Runner<'_>, map: usize, count: usize) -> Range<usize> {
     let own = runner.places[map].clone();
     if runner.places.len() == 1 { own.start..count } else { own }

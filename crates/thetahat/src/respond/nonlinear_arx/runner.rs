@@ -8,7 +8,8 @@ use crate::model::{ChannelExpression, Evaluator, ExpressionBuffer, NonlinearArxM
 
 /// A free run beyond this many times the largest output of the fit is lost.
 const LOST: f64 = 1e6;
-/// Outputs that are fed back are kept within this many times the range of the estimation rows, about its middle, where that is asked for.
+/// Outputs that are fed back are kept within this many times the range of the estimation rows, about its middle, where
+/// that is asked for.
 const RANGE: f64 = 1.1;
 
 /// A model laid out for runs along signals, which are deviations from its offsets.
@@ -132,9 +133,9 @@ impl<'m> Runner<'m> {
         (from.max(self.output_lags)..end).find(known)
     }
 
-    /// Runs from sample `rows.start` on, driven by the inputs and by its own outputs. Before it stands what was measured, or where the run
-    /// begins `at_rest` nothing. What leaves the range of sense is NaN to the end. With `clamp` outputs are kept within 1.1 times the range
-    /// of the estimation rows.
+    /// Runs from sample `rows.start` on, driven by the inputs and by its own outputs. Before it stands what was
+    /// measured, or where the run begins `at_rest` nothing. What leaves the range of sense is NaN to the end. With
+    /// `clamp` outputs are kept within 1.1 times the range of the estimation rows.
     pub(super) fn run(&self, signals: &Signals<'_>, rows: Range<usize>, at_rest: bool, clamp: bool) -> Run {
         let (mut walk, mut clamped) = (Walk::new(self, true), 0);
         walk.begin(signals, rows.clone(), rows.start, at_rest);
@@ -249,8 +250,8 @@ impl<'r, 'm> Walk<'r, 'm> {
         }
     }
 
-    /// Begins at some rows. Outputs, and expressions of them, are known before row `known`; what stands before the first row of a log,
-    /// or with `at_rest` before the first of these rows, is at its level.
+    /// Begins at some rows. Outputs, and expressions of them, are known before row `known`; what stands before the
+    /// first row of a log, or with `at_rest` before the first of these rows, is at its level.
     pub(super) fn begin(&mut self, signals: &Signals<'_>, rows: Range<usize>, known: usize, at_rest: bool) {
         let (runner, lags) = (self.runner, self.runner.lags);
         self.first = rows.start;

@@ -1,7 +1,7 @@
 //! The response of a process to held inputs, at the times of the rows.
 //!
-//! The state moves from row to row with the input of the row before. A dead time theta looks at it theta seconds earlier, between two
-//! rows: y(t) = w'c(t - theta). So
+//! The state moves from row to row with the input of the row before. A dead time theta looks at it theta seconds
+//! earlier, between two rows: y(t) = w'c(t - theta). So
 //!
 //! ```text
 //! dy(t)/dtheta = -w' d/dt c(t - theta)
@@ -34,19 +34,22 @@ pub(crate) struct HeldLog {
     pub(crate) rows: Range<usize>,
     /// Which of them count, in the same numbers.
     pub(crate) counted: Vec<Range<usize>>,
-    /// Whether it begins after a pause of the clock, in which nobody knows what its inputs were: its state is then its own.
+    /// Whether it begins after a pause of the clock, in which nobody knows what its inputs were: its state is then its
+    /// own.
     pub(crate) after_pause: bool,
     /// Where its first row stands on the clock of all of them, in seconds.
     pub(crate) begins: f64,
     /// Seconds since its first row.
     pub(crate) times: Vec<f64>,
-    /// For each input a value for each row. A missing one holds the value before it; the first ones have the first that is known.
+    /// For each input a value for each row. A missing one holds the value before it; the first ones have the first that
+    /// is known.
     pub(crate) inputs: Vec<Vec<f64>>,
     /// How many values of inputs are missing.
     pub(crate) held: usize,
 }
 
-/// Each of the joined logs that has some of the rows, in pieces without a long pause of the clock. Through a short one inputs hold.
+/// Each of the joined logs that has some of the rows, in pieces without a long pause of the clock. Through a short one
+/// inputs hold.
 ///
 /// # Errors
 /// [`Error::Data`] for a channel that is not there, or an input that has no value at all.
@@ -236,7 +239,8 @@ fn sensitivities_in<const SHAPE: usize>(
     });
 }
 
-/// The responses to a first state of each lag, one after the other, without an input: what a log that does not begin at rest has of them.
+/// The responses to a first state of each lag, one after the other, without an input: what a log that does not begin at
+/// rest has of them.
 pub(crate) fn modes(structure: &ProcessStructure, shape: &[f64], times: &[f64]) -> Vec<Vec<f64>> {
     let chain = structure.chain(shape);
     let of_state = |state: usize| {

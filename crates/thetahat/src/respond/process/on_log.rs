@@ -11,7 +11,8 @@ use crate::data::{Log, Rows, measured};
 use crate::model::{Parts, ProcessModel, Signal};
 use crate::respond::{Forecast, Horizon, InitialCondition, Response, on_log::OnLog, tested::Tested};
 
-/// A process beside a log of which its offsets were taken. Its errors do not depend on past outputs, so predictions are free runs.
+/// A process beside a log of which its offsets were taken. Its errors do not depend on past outputs, so predictions are
+/// free runs.
 #[derive(Debug)]
 pub(crate) struct ProcessOnLog<'l> {
     model: &'l ProcessModel,
@@ -49,8 +50,8 @@ impl<'l> ProcessOnLog<'l> {
         })
     }
 
-    /// Adds to a response what the state that explains the outputs best in the rows that count does to it, of all logs or of those that
-    /// begin after a pause.
+    /// Adds to a response what the state that explains the outputs best in the rows that count does to it, of all logs
+    /// or of those that begin after a pause.
     fn add_free(&self, response: &mut [f64], all: bool) {
         for part in self.held.iter().filter(|part| all || part.after_pause) {
             let first = part.rows.start;

@@ -6,8 +6,8 @@
 //! G(omega) = w'(C (F_p (z I - F)^-1 G + G_p) + D) z^-m,   F = e^(A T),  F_p = e^(A p),  G, G_p the same of a held input
 //! ```
 //!
-//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). It is solved in the states: polynomials of a process
-//! that is slow beside its samples lose digits near z = 1.
+//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). It is solved in the states:
+//! polynomials of a process that is slow beside its samples lose digits near z = 1.
 
 use thetahat_core::{Dual, Number};
 
@@ -59,8 +59,8 @@ pub(crate) fn responses(
     columns(structure, shape, dead_time, (frequencies, time), take);
 }
 
-/// Calls `take` for each frequency with the columns, and with the slopes of their sum by the shape and, last, by the dead time; each as
-/// real and imaginary part.
+/// Calls `take` for each frequency with the columns, and with the slopes of their sum by the shape and, last, by the
+/// dead time; each as real and imaginary part.
 pub(crate) fn response_slopes(
     structure: &ProcessStructure,
     parts: &Parts<f64>,

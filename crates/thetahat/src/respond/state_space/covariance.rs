@@ -1,8 +1,8 @@
 //! What is not known of a state because outputs are missing.
 //!
-//! While all outputs are measured the state is known from them, and the gain of the predictor is K. Where only the outputs O are measured, or
-//! none, the error of the predicted state has a covariance P, and the best prediction is that of the time-varying Kalman filter of the
-//! innovations form: with e ~ (0, R)
+//! While all outputs are measured the state is known from them, and the gain of the predictor is K. Where only the
+//! outputs O are measured, or none, the error of the predicted state has a covariance P, and the best prediction is
+//! that of the time-varying Kalman filter of the innovations form: with e ~ (0, R)
 //!
 //! ```text
 //! S  = H_O P H_O' + R_OO,   L = (F P H_O' + K R_O) S^-1         R_O: the columns of R of the outputs O
@@ -10,26 +10,28 @@
 //! P+ = F P F' + K R K' - L S L'
 //! ```
 //!
-//! (Anderson and Moore, Optimal Filtering, 1979, sections 5.5 and 9.3). With W = K R_O R_OO^-1, the gain where P = 0, it is computed as
+//! (Anderson and Moore, Optimal Filtering, 1979, sections 5.5 and 9.3). With W = K R_O R_OO^-1, the gain where P = 0,
+//! it is computed as
 //!
 //! ```text
 //! A = F - W H_O,   C = A P H_O' S^-1,   L = W + C
 //! P+ = (A - C H_O) P (A - C H_O)' + C R_OO C' + (K - W E_O) R (K - W E_O)'      E_O: picks e_O of e
 //! ```
 //!
-//! which is the same without a difference: P stays symmetric and nonnegative, and where all outputs are measured (W = K) it decays to nothing
-//! rather than to rounding. Outputs of which nothing but rounding is left beside others, as where R is singular, have no gain of their own.
+//! which is the same without a difference: P stays symmetric and nonnegative, and where all outputs are measured (W =
+//! K) it decays to nothing rather than to rounding. Outputs of which nothing but rounding is left beside others, as
+//! where R is singular, have no gain of their own.
 
 use thetahat_core::nalgebra::DMatrix;
 use thetahat_numerics::optimize::normal;
 
 use crate::model::StateSpace;
 
-/// A state is known where what is not known of it adds less than this to the outputs of the next n rows, in units of their noise variances,
-/// summed over outputs and rows: innovations then differ by less than their twelfth digit.
+/// A state is known where what is not known of it adds less than this to the outputs of the next n rows, in units of
+/// their noise variances, summed over outputs and rows: innovations then differ by less than their twelfth digit.
 const KNOWN: f64 = 1e-12;
-/// A state is lost where it adds more than this: what follows is better predicted from a state that is estimated anew, and rounding of P would
-/// be seen beside R.
+/// A state is lost where it adds more than this: what follows is better predicted from a state that is estimated anew,
+/// and rounding of P would be seen beside R.
 const LOST: f64 = 1e12;
 
 /// P along the rows of a log, and what the gain of a row is.
@@ -39,7 +41,8 @@ pub(super) struct StateCovariance {
     h: DMatrix<f64>,
     k: DMatrix<f64>,
     noise: DMatrix<f64>,
-    /// sum_(j<n) (H A^j)' V^-1 H A^j with A = F - K H, V the variances of the outputs' noises: what states do to the next n rows of outputs.
+    /// sum_(j<n) (H A^j)' V^-1 H A^j with A = F - K H, V the variances of the outputs' noises: what states do to the
+    /// next n rows of outputs.
     weights: DMatrix<f64>,
     /// Of the outputs that were measured in the last row that needed it.
     pattern: Pattern,
@@ -154,8 +157,8 @@ impl StateCovariance {
         self.varies = false;
     }
 
-    /// Goes over a row with these outputs, of which some may be missing. Whether it has a gain of its own: where all are measured and the state
-    /// is known the gain is K, and nothing is computed. O(n^2 (n + l)) where it has one.
+    /// Goes over a row with these outputs, of which some may be missing. Whether it has a gain of its own: where all
+    /// are measured and the state is known the gain is K, and nothing is computed. O(n^2 (n + l)) where it has one.
     pub(super) fn step(&mut self, outputs: &[&[f64]], row: usize) -> bool {
         let is_measured = |output: &&[f64]| !output[row].is_nan();
         let complete = outputs.iter().all(is_measured);

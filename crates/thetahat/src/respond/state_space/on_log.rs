@@ -25,7 +25,8 @@ pub(crate) struct StateSpaceOnLog<'l> {
     matrices: StateSpace,
     /// What predictions are made from.
     ahead: JointRecord<'l>,
-    /// The rows of predictions, in which outputs may be missing: each segment begins and ends with a row in which one is measured.
+    /// The rows of predictions, in which outputs may be missing: each segment begins and ends with a row in which one
+    /// is measured.
     segments: Vec<Range<usize>>,
     /// Where outputs are missing in these.
     covariance: Option<StateCovariance>,
@@ -43,7 +44,8 @@ pub(crate) struct StateSpaceOnLog<'l> {
 struct Segments {
     /// A missing output counts as zero: its innovation is the prediction with another sign.
     errors: Vec<Vec<Vec<f64>>>,
-    /// What innovations did to the next state beside what K did, with the samples of each segment in which that is not zero.
+    /// What innovations did to the next state beside what K did, with the samples of each segment in which that is not
+    /// zero.
     corrections: Vec<Vec<(usize, DVector<f64>)>>,
     state: Vec<f64>,
     /// What is not known of that state; none where it is known.
@@ -190,8 +192,8 @@ impl<'l> StateSpaceOnLog<'l> {
         response
     }
 
-    /// What uncertain states add to the variances of predictions: a value for each row of each output, zero where states are known. None where
-    /// no output is missing.
+    /// What uncertain states add to the variances of predictions: a value for each row of each output, zero where
+    /// states are known. None where no output is missing.
     fn added(&self, steps: usize) -> Option<Cow<'_, [Vec<f64>]>> {
         let covariance = self.covariance.as_ref()?;
         let compute = || {
@@ -274,7 +276,8 @@ impl<'l> StateSpaceOnLog<'l> {
         responses
     }
 
-    /// The deviations of each output 1 … `steps` steps ahead; less than that many where the last stands for those after it.
+    /// The deviations of each output 1 … `steps` steps ahead; less than that many where the last stands for those after
+    /// it.
     fn spread(&self, steps: usize) -> Vec<Vec<f64>> {
         let noise = &self.matrices.noise_covariance;
         let mut covariance = noise.clone();
@@ -301,9 +304,9 @@ fn misses(output: &[f64], rows: &Range<usize>) -> bool {
     output[rows.clone()].iter().any(|value| value.is_nan())
 }
 
-/// The rows that are gone through from where a state is estimated to where none is left to predict: from the first in which an output is
-/// measured to the last. Where a state is lost, as that of an unstable model in a long hole, they end with the last row in which an output was
-/// measured, and others begin with the next in which all are.
+/// The rows that are gone through from where a state is estimated to where none is left to predict: from the first in
+/// which an output is measured to the last. Where a state is lost, as that of an unstable model in a long hole, they
+/// end with the last row in which an output was measured, and others begin with the next in which all are.
 fn through_missing_outputs(
     covariance: &mut StateCovariance,
     outputs: &[&[f64]],
@@ -418,7 +421,8 @@ impl OnLog for StateSpaceOnLog<'_> {
         if count == 0.0 { (variance, None) } else { (expected / count, mse.map(|_| ratio / count)) }
     }
 
-    /// Where a state is uncertain errors are as many times smaller as their deviation is larger: those of all rows are then alike.
+    /// Where a state is uncertain errors are as many times smaller as their deviation is larger: those of all rows are
+    /// then alike.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error> {
         let (model, record) = (&*self.model, &self.ahead);
         let found = self.innovations(self.natural());

@@ -16,14 +16,16 @@ fn weight(variance: f64) -> f64 {
 
 /// A model that is stepped along the rows of a log.
 ///
-/// Row by row it makes [x(t+1); y(t)] of [x(t); u(t)], with e = 0; or, as a predictor, [x(t+1); e(t)] of [x(t); u(t); y(t)] with
+/// Row by row it makes [x(t+1); y(t)] of [x(t); u(t)], with e = 0; or, as a predictor, [x(t+1); e(t)] of [x(t); u(t);
+/// y(t)] with
 ///
 /// ```text
 /// x(t+1) = (F - K H) x(t) + (G - K D) u(t) + K y(t),   e(t) = y(t) - H x(t) - D u(t)
 /// ```
 ///
-/// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own. Four rows of the matrix stand together: the
-/// sums of a block stay in registers, and each is that of its row, one column after the other.
+/// A step is one product with a matrix, (n + l) (n + m + l) multiply-adds, in memory of its own. Four rows of the
+/// matrix stand together: the sums of a block stay in registers, and each is that of its row, one column after the
+/// other.
 ///
 /// [Through missing outputs](Self::through_missing_outputs) the gain is that of each row.
 #[derive(Debug, Clone)]
@@ -93,7 +95,8 @@ impl Recursion {
         self
     }
 
-    /// A predictor of outputs that may be missing, each of them: the gain of a row is that of what was measured in it and before.
+    /// A predictor of outputs that may be missing, each of them: the gain of a row is that of what was measured in it
+    /// and before.
     pub(super) fn through_missing_outputs(self, covariance: StateCovariance) -> Self {
         Self { covariance: Some(Box::new(covariance)), ..self }
     }
@@ -150,7 +153,8 @@ impl Recursion {
         self.covariance.as_deref().filter(|covariance| covariance.varies())
     }
 
-    /// What comes out of a row: the innovations, or the outputs. The signals are inputs, then outputs as far as it is fed with them.
+    /// What comes out of a row: the innovations, or the outputs. The signals are inputs, then outputs as far as it is
+    /// fed with them.
     ///
     /// Where outputs may be missing, one that is counts as zero in what comes out: the prediction with another sign.
     pub(crate) fn step(&mut self, signals: &[&[f64]], row: usize) -> &[f64] {
@@ -182,10 +186,11 @@ impl Recursion {
         out
     }
 
-    /// Starts a segment from the state that explains its outputs best: with M(t) = H A^t, A the matrix of the recursion, what is left of them
-    /// is r(t) - M(t) x(0), with r what is left from rest, and the state that of weighted least squares. `outputs` may miss values. Rows count
-    /// as long as the state is seen in them. Through missing outputs A is that of each row, and so is the variance of what is left.
-    /// O(T n (n + m + l + l n)) for T of these.
+    /// Starts a segment from the state that explains its outputs best: with M(t) = H A^t, A the matrix of the
+    /// recursion, what is left of them is r(t) - M(t) x(0), with r what is left from rest, and the state that of
+    /// weighted least squares. `outputs` may miss values. Rows count as long as the state is seen in them. Through
+    /// missing outputs A is that of each row, and so is the variance of what is left. O(T n (n + m + l + l n)) for T of
+    /// these.
     pub(crate) fn start_at_best(&mut self, signals: &[&[f64]], outputs: &[&[f64]], rows: Range<usize>) {
         let n = self.states;
         let (mut matrix, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));

@@ -14,14 +14,15 @@ use crate::respond::{
     transient::lasting,
 };
 
-/// The frequency responses of an output at `frequencies` in radians per second: of each input, and with a single output of its noise.
+/// The frequency responses of an output at `frequencies` in radians per second: of each input, and with a single output
+/// of its noise.
 ///
 /// ```text
 /// H (q I - F)^-1 G + D,   q = exp(i omega T)
 /// ```
 ///
-/// by an LU factor at each frequency, O(n^3): the coefficients of transfer functions would lose digits at high orders. Phases are continuous
-/// from frequency 0 on, as [`frequency_response`](crate::respond::frequency_response) has them.
+/// by an LU factor at each frequency, O(n^3): the coefficients of transfer functions would lose digits at high orders.
+/// Phases are continuous from frequency 0 on, as [`frequency_response`](crate::respond::frequency_response) has them.
 ///
 /// # Errors
 /// As for [`frequency_response`](crate::respond::frequency_response).
@@ -73,7 +74,8 @@ pub(crate) fn frequency_response(
     Ok(names.zip(found).map(|(input, points)| FrequencyResponse { input, points }).collect())
 }
 
-/// What states do at a point q of the complex plane, seen by an output: w' = h (q I - F)^-1; of equations in continuous time q is s and F is A.
+/// What states do at a point q of the complex plane, seen by an output: w' = h (q I - F)^-1; of equations in continuous
+/// time q is s and F is A.
 pub(in crate::respond) struct Resolvent<'m> {
     weights: DVector<Complex<f64>>,
     known: Option<&'m EntryCovariance>,

@@ -86,8 +86,8 @@ fn parameters_add_the_square_of_what_they_do() {
         for &start in
             starts(&model).iter().filter(|start| !(cancels && **start == InitialCondition::Estimate))
         {
-            // What initial conditions are worth depends on the parameters too, in proportion to the errors: of second order,
-            // and not there without errors.
+            // What initial conditions are worth depends on the parameters too, in proportion to the errors: of second
+            // order, and not there without errors.
             let record = if start == InitialCondition::Estimate {
                 Record {
                     output: &exact,

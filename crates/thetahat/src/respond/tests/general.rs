@@ -309,8 +309,8 @@ fn effects_of_the_past(model: &PolynomialModel, length: usize) -> Vec<Vec<f64>> 
     effects
 }
 
-/// What each single value of an input with F before a segment does to x, and how many more initial conditions it takes to make
-/// up for all of them where x counts from sample `first` on.
+/// What each single value of an input with F before a segment does to x, and how many more initial conditions it takes
+/// to make up for all of them where x counts from sample `first` on.
 fn effects_of_inputs(model: &PolynomialModel, length: usize, first: usize) -> (Vec<Vec<f64>>, usize) {
     let (mut effects, mut more) = (Vec::new(), 0);
     for (b, f) in model.b.iter().zip(&model.f).filter(|(_, f)| f.len() > 1) {

@@ -103,7 +103,8 @@ fn the_confidence_is_the_posterior_weight_of_the_delay() {
     );
 }
 
-/// u(t) = K (r(t) - y(t)) explains y(t) at once, but does not act so: where it is sure to follow past errors it has no lag 0, else words doubt it.
+/// u(t) = K (r(t) - y(t)) explains y(t) at once, but does not act so: where it is sure to follow past errors it has no
+/// lag 0, else words doubt it.
 #[test]
 fn an_effect_at_once_that_may_be_feedback_is_said_to_be_one() {
     for (gain, held, rows, certain) in

@@ -126,7 +126,8 @@ fn figures_of_blocks_are_those_of_single_fits() {
     assert!((seen.percent() - 100.0 * (1.0 - (seen.blocks * seen.onward).powf(0.25))).abs() < 1e-12);
 }
 
-/// A noise that wanders, which a slow pole of the plant would follow: free runs have levels of their own, and the noise integrates.
+/// A noise that wanders, which a slow pole of the plant would follow: free runs have levels of their own, and the noise
+/// integrates.
 #[test]
 fn a_slow_pole_is_not_rewarded_for_a_drift() {
     let mut noise = Noise(18);

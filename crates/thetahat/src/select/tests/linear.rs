@@ -195,8 +195,8 @@ fn one_model_alone_has_no_second() {
 
 #[test]
 fn of_equal_models_the_smaller_is_taken() {
-    // y does not depend on u: with MDL they differ; on the validation rows a model of one parameter more has the same cost
-    // where its coefficient is zero, as that input is silent there.
+    // y does not depend on u: with MDL they differ; on the validation rows a model of one parameter more has the same
+    // cost where its coefficient is zero, as that input is silent there.
     let mut noise = Noise(17);
     let (u, e) = (noise.take(200), noise.take(200));
     let y = filtered(&[1.0], &[1.0, -0.8], &e);

@@ -222,7 +222,8 @@ fn dropped_samples_are_not_for_models_with_f() {
     assert!(chosen(&record, None, &choice, Select::MDL, Initial::Zero).is_ok());
 }
 
-/// A plant with slow poles that is not at rest at first: without its initial state no model with F would explain the log.
+/// A plant with slow poles that is not at rest at first: without its initial state no model with F would explain the
+/// log.
 #[test]
 fn models_with_f_need_not_begin_at_rest() {
     let mut noise = Noise(59);

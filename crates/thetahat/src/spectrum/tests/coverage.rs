@@ -7,8 +7,8 @@ use super::*;
 /// Poles of radius 0.97 at 0.6 radians per row.
 const RESONANT: Plant = Plant { b: [0.0, 1.0], a: [-1.601_150_2, 0.940_9] };
 
-/// What share of points in the band 0.1 … 3 rad a magnitude's interval holds, in how many of the runs bands are called honest, and the
-/// root mean square of the relative error.
+/// What share of points in the band 0.1 … 3 rad a magnitude's interval holds, in how many of the runs bands are called
+/// honest, and the root mean square of the relative error.
 fn measured(method: Method, runs: u64) -> (f64, f64, f64) {
     let of = |run: u64| {
         let u = noise(1000 + run, 4096);
@@ -45,8 +45,9 @@ fn measured(method: Method, runs: u64) -> (f64, f64, f64) {
     (mean(|all| all.0), mean(|all| all.1), mean(|all| all.2).sqrt())
 }
 
-/// Over 300 runs the intervals held in 95.4 % (lpm of 6 lines), 95.6 % (12), 74.5 % (spa of 30 lags), 92.6 % (100), 95.9 % (300),
-/// 90.4 % (welch of 128 rows) and 95.5 % (512), with errors of 1.08, 0.68, 0.25, 0.28, 0.49, 0.28 and 0.56.
+/// Over 300 runs the intervals held in 95.4 % (lpm of 6 lines), 95.6 % (12), 74.5 % (spa of 30 lags), 92.6 % (100),
+/// 95.9 % (300), 90.4 % (welch of 128 rows) and 95.5 % (512), with errors of 1.08, 0.68, 0.25, 0.28, 0.49, 0.28 and
+/// 0.56.
 #[test]
 fn bands_hold_what_the_document_says() {
     const RUNS: u64 = 12;

@@ -155,7 +155,8 @@ fn a_loop_is_warned_of() {
     assert!(open.warnings.is_empty(), "{:?}", open.warnings);
 }
 
-/// y(t) = 1.05 y(t-1) + u(t-1) + e(t), u(t) = r(t) - 0.4 y(t): the controller is driven by r and has little noise to answer.
+/// y(t) = 1.05 y(t-1) + u(t-1) + e(t), u(t) = r(t) - 0.4 y(t): the controller is driven by r and has little noise to
+/// answer.
 #[test]
 fn an_unstable_plant_is_held_by_a_loop() {
     let (r, e) = (noise(31, 3000), noise(32, 3000));

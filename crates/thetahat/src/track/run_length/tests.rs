@@ -80,9 +80,9 @@ fn false_alarms_come_as_often_as_asked() {
     }
 }
 
-/// The number of alarms that a detector gives of a filter with three sensors of a wandering position and its speed, whose
-/// model is right but for the variances of two sensors, which are `factor` times as large. Each measurement is missing in
-/// `missing` of 1000 samples.
+/// The number of alarms that a detector gives of a filter with three sensors of a wandering position and its speed,
+/// whose model is right but for the variances of two sensors, which are `factor` times as large. Each measurement is
+/// missing in `missing` of 1000 samples.
 fn alarms_of_a_filter(detector: &mut ChangeDetector<f64>, samples: usize, factor: f64, missing: u32) -> f64 {
     let diagonal = |entries: [f64; 3]| Covariance::from_diagonal(&entries.into()).unwrap();
     let noise = Covariance::from_diagonal(&Vector2::new(0.0, 0.04)).unwrap();

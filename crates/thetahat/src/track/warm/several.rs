@@ -36,8 +36,8 @@ impl Tracker {
     /// [`coupled`](Tracker::coupled) trackers.
     ///
     /// # Errors
-    /// Those of `from_report`; [`Error::Report`] if the report is of another kind of model, or its matrices are not those of its A and B, as
-    /// after a reduction; [`Error::Argument`] if there is no such output.
+    /// Those of `from_report`; [`Error::Report`] if the report is of another kind of model, or its matrices are not
+    /// those of its A and B, as after a reduction; [`Error::Argument`] if there is no such output.
     pub fn from_report_of(report: &Report, output: usize, plan: &TrackPlan) -> Result<Self, Error> {
         let own = report.model.as_state_space().filter(|model| model.outputs.len() > 1 || output > 0);
         let Some(model) = own else { return Self::from_report(report, plan) };

@@ -28,7 +28,8 @@ fn wanted() -> TunerSettings<f64> {
     TunerSettings::new(RESPONSE, -10.0..=10.0, 1.0)
 }
 
-/// Set points that change for 3000 samples, then 3000 with 0; returns the variances of outputs and inputs in the latter.
+/// Set points that change for 3000 samples, then 3000 with 0; returns the variances of outputs and inputs in the
+/// latter.
 fn run(seed: u64, mut control: impl FnMut(f64, f64) -> f64) -> [f64; 2] {
     let (mut noise, mut before, mut variances) = (Noise(seed), 0.0, [0.0; 2]);
     let mut plant = Simulated::new([1.0, TRUTH[0], TRUTH[1]], &TRUTH[2..4]);
@@ -66,8 +67,8 @@ fn noise_that_is_not_white_takes_a_model_with_c() -> Result<(), Error> {
     Ok(())
 }
 
-/// The C of the model is in A_o = C (1 - p q⁻¹), and the poles are those that were wanted: with more coefficients of R where a small
-/// model leaves it too few, as A = 1 + a q⁻¹, B = b q⁻¹, for A_m A_o of degree 4.
+/// The C of the model is in A_o = C (1 - p q⁻¹), and the poles are those that were wanted: with more coefficients of R
+/// where a small model leaves it too few, as A = 1 + a q⁻¹, B = b q⁻¹, for A_m A_o of degree 4.
 #[test]
 fn the_observer_is_that_of_the_noise() -> Result<(), Error> {
     const SMALL: TunerOrders = TunerOrders { na: 1, nb: 1, nc: 1, constant: true, integrator: true };

@@ -13,8 +13,8 @@ fn between(noise: &mut Noise, low: f64, high: f64) -> f64 {
     low + (high - low) * 0.5 * (noise.next() + 1.0)
 }
 
-/// Real, complex and integrating poles; a zero anywhere but near 1; a static gain of 0.3 to 3 (a speed of a tenth of that); the dead time
-/// comes with it.
+/// Real, complex and integrating poles; a zero anywhere but near 1; a static gain of 0.3 to 3 (a speed of a tenth of
+/// that); the dead time comes with it.
 pub(super) fn random(noise: &mut Noise) -> (Simulated, usize) {
     let kind = between(noise, 0.0, 1.0);
     let (a, unit) = if kind < 0.4 {
@@ -41,8 +41,8 @@ pub(super) fn random(noise: &mut Noise) -> (Simulated, usize) {
     (Simulated::new(a, &b), dead_time)
 }
 
-/// Whether the output is at the set point at the ends of the last four halves of a square wave: within 5 %, or four standard deviations of
-/// the output with a set point that stays.
+/// Whether the output is at the set point at the ends of the last four halves of a square wave: within 5 %, or four
+/// standard deviations of the output with a set point that stays.
 fn settles<C: Clone>(
     plant: &mut Simulated,
     noise: &mut Noise,
@@ -113,8 +113,8 @@ type Direct = DirectSelfTuner<
     Const<{ DIRECT.delays() }>,
 >;
 
-/// Of plants with stable inverses, and of all others, how many of a hundred follow with the coefficients of the controller estimated;
-/// a delay of three samples, or one more than the controller knows.
+/// Of plants with stable inverses, and of all others, how many of a hundred follow with the coefficients of the
+/// controller estimated; a delay of three samples, or one more than the controller knows.
 #[test]
 fn direct_adaptation_needs_a_stable_inverse_and_the_right_delay() -> Result<(), Error> {
     for (minimum_phase, later, expected) in [(true, 0, 95..=100), (true, 1, 0..=10), (false, 0, 0..=30)] {

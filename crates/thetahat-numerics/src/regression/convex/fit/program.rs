@@ -84,8 +84,8 @@ impl Fitting<'_> {
     fn add_goal(&self, program: &mut Program, frame: &Frame, working: &Working, norm: Norm) {
         let (size, count) = (self.sizes.len(), self.samples.count() as f64);
         if norm == Norm::Two {
-            // The factor holds the ridge, and rows that the limits keep constant. With a bound on |e| the optimum may be
-            // far from least squares, compared with how far w can go: then its value is scaled to that.
+            // The factor holds the ridge, and rows that the limits keep constant. With a bound on |e| the optimum may
+            // be far from least squares, compared with how far w can go: then its value is scaled to that.
             let way = self.way(&frame.base) / frame.unit;
             let scale = way.norm().max(1.0);
             program.hessian.fill_diagonal(1.0 / scale);

@@ -26,17 +26,18 @@ pub(super) struct Lost;
 /// J = sum_k e(k)^2 + sum_j r_j theta_j^2,   e(k) = y(k) - g(z(k), theta)
 /// ```
 ///
-/// over runs that begin at what was measured: within a run z has outputs of the run itself. With s = dg(z(k))/dtheta along it,
+/// over runs that begin at what was measured: within a run z has outputs of the run itself. With s = dg(z(k))/dtheta
+/// along it,
 ///
 /// ```text
 /// s(k) = dg/dtheta + sum_i dg/dy(k-i) s(k-i),   s = 0 before the run
 /// ```
 ///
-/// (Williams and Zipser, Neural Computation 1, 1989; Narendra and Parthasarathy, IEEE Trans. Neural Networks 1, 1990), g = s'e and
-/// G = s's. Runs of one sample are errors one step ahead, a run of all samples is the free run.
+/// (Williams and Zipser, Neural Computation 1, 1989; Narendra and Parthasarathy, IEEE Trans. Neural Networks 1, 1990),
+/// g = s'e and G = s's. Runs of one sample are errors one step ahead, a run of all samples is the free run.
 ///
-/// Cost of an evaluation: g of each sample; of the normal equations N (p^2 + 2 na p) flops, of which the first are a product of
-/// matrices. Nothing allocates but what products of matrices keep.
+/// Cost of an evaluation: g of each sample; of the normal equations N (p^2 + 2 na p) flops, of which the first are a
+/// product of matrices. Nothing allocates but what products of matrices keep.
 pub(super) struct RunErrors<'s> {
     y: &'s [f64],
     /// For each regressor its signal, its lag, and whether it is the output.
@@ -123,7 +124,8 @@ impl<'s> RunErrors<'s> {
         }
     }
 
-    /// Adds the products of the first `count` columns of a block to the normal equations, and moves the last columns to its front.
+    /// Adds the products of the first `count` columns of a block to the normal equations, and moves the last columns to
+    /// its front.
     fn add(&mut self, count: usize) {
         let size = self.all.len();
         let own = &self.columns[self.lags * size..(self.lags + count) * size];

@@ -28,8 +28,9 @@ impl Units {
         }
     }
 
-    /// Functions drawn for a start: each bends, or stands, at one of the samples, drawn evenly; the directions of units are drawn evenly,
-    /// and their slopes are about those of the regressors. Radial basis functions are so wide that neighbours overlap.
+    /// Functions drawn for a start: each bends, or stands, at one of the samples, drawn evenly; the directions of units
+    /// are drawn evenly, and their slopes are about those of the regressors. Radial basis functions are so wide that
+    /// neighbours overlap.
     pub(crate) fn draw(self, samples: &Samples<'_>, size: usize, seed: u64, start: u64) -> Map {
         let mut random = Random::of(seed, start);
         let count = samples.rows.len();

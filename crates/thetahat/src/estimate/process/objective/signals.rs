@@ -37,8 +37,8 @@ impl ProcessObjective<'_> {
         self.held.iter().map(of_part).collect()
     }
 
-    /// What the responses from some inputs leave of the output in every row of each part, on a straight line where it is not measured; or
-    /// the points of an input.
+    /// What the responses from some inputs leave of the output in every row of each part, on a straight line where it
+    /// is not measured; or the points of an input.
     pub(in crate::estimate::process) fn left_by(
         &self,
         input: usize,
@@ -69,7 +69,8 @@ impl ProcessObjective<'_> {
         self.rows.iter().map(|(part, row)| signal[*part][*row]).collect()
     }
 
-    /// s^k/A(s) of such a signal, less its first value, for k = 0 … n. It moves along straight lines: that is an integrator fed with slopes.
+    /// s^k/A(s) of such a signal, less its first value, for k = 0 … n. It moves along straight lines: that is an
+    /// integrator fed with slopes.
     pub(in crate::estimate::process) fn filtered(
         &self,
         input: usize,
@@ -111,7 +112,8 @@ impl ProcessObjective<'_> {
     }
 }
 
-/// Puts values that are missing on the line between those beside them; before the first and after the last they are these.
+/// Puts values that are missing on the line between those beside them; before the first and after the last they are
+/// these.
 fn joined(values: &mut [f64], times: &[f64]) {
     let known: Vec<usize> = (0..values.len()).filter(|row| !values[*row].is_nan()).collect();
     let (Some(&first), Some(&last)) = (known.first(), known.last()) else { return };

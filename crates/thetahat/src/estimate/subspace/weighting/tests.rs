@@ -12,7 +12,8 @@ fn options(weighting: Weighting, past: usize, future: usize) -> SubspaceOptions 
     SubspaceOptions { weighting, past: Some(past), future: Some(future), ..SubspaceOptions::default() }
 }
 
-/// The channels of a public log: of those in the repository, or in the folder that THETAHAT_LOGS names; where it is absent, says so.
+/// The channels of a public log: of those in the repository, or in the folder that THETAHAT_LOGS names; where it is
+/// absent, says so.
 fn public_log(name: &str) -> Option<Vec<Vec<f64>>> {
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/public").to_owned();
     let found = [Some(own), std::env::var("THETAHAT_LOGS").ok()]

@@ -2,7 +2,8 @@
 
 use crate::model::{EquationsModel, GreyBox};
 
-/// Three states, two inputs of which one acts at once, two outputs, and two unknown parameters of which one has a bound.
+/// Three states, two inputs of which one acts at once, two outputs, and two unknown parameters of which one has a
+/// bound.
 const TEXT: &str = "\
 sample_time = 0.1
 [states]

@@ -144,7 +144,8 @@ fn small_values_keep_their_digits() {
         sample_time: 1.0,
     };
     let values = model.hankel_singular_values().unwrap();
-    // P = Q with P_ij = 1/(1 - p_i p_j), so that the values are the eigenvalues of P, and their product Cauchy's determinant.
+    // P = Q with P_ij = 1/(1 - p_i p_j), so that the values are the eigenvalues of P, and their product Cauchy's
+    // determinant.
     let mut logarithm = 0.0;
     for (i, one) in poles.iter().enumerate() {
         logarithm -= (1.0 - one * one).ln();
@@ -173,7 +174,8 @@ fn poles_that_do_not_decay_are_kept() {
     g[(5, 1)] = -0.4;
     let mut h = stable.h.clone().insert_columns(4, 4, 0.5);
     h[(0, 7)] = 0.1;
-    // K places the poles of the predictor: a Kalman gain would; here that of the stable part is enough to test the response to u.
+    // K places the poles of the predictor: a Kalman gain would; here that of the stable part is enough to test the
+    // response to u.
     let k = stable.k.clone().insert_rows(4, 4, 0.0);
     let change = DMatrix::from_fn(8, 8, |row, column| {
         let entry = ((3 * row + 5 * column) % 11) as f64 - 5.0;

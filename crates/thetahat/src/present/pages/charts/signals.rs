@@ -134,8 +134,8 @@ impl<'a> Stack<'a> {
         self.traces.push(trace);
     }
 
-    /// Marks rows of a signal under a name, which the legend has once: single rows, or from the first to the last where the signal stays
-    /// at a value.
+    /// Marks rows of a signal under a name, which the legend has once: single rows, or from the first to the last where
+    /// the signal stays at a value.
     pub(crate) fn marks(&mut self, name: &str, rows: &[Rows], values: &[f64], legend: bool) {
         let at = |row: usize| Some((self.at(*self.time.get(row)?), significant(*values.get(row)?)));
         let ends = rows.iter().filter_map(|rows| Some([at(rows.first() - 1)?, at(rows.last() - 1)?]));

@@ -15,8 +15,8 @@ const LEVEL: f64 = 0.632_120_558_828_557_7;
 /// What was measured.
 const MEASURED: &str = "rgba(128,128,128,0.7)";
 
-/// Measured values against seconds since the step; the levels, the tangent, the point at 63.2 % or the peak, and the response of a first or of
-/// a second order with the figures to trust.
+/// Measured values against seconds since the step; the levels, the tangent, the point at 63.2 % or the peak, and the
+/// response of a first or of a second order with the figures to trust.
 pub(crate) fn step_response(
     number: usize,
     step: &Step,

@@ -18,8 +18,8 @@ use crate::validate::Fit;
 /// Of the pendulum's parameters, in their order. None has bounds, so that z is the parameter.
 pub(super) const TRUTH: [f64; 5] = [-0.5, 2.0, 1.5, 0.1, 0.3];
 
-/// A pendulum with this process noise and 1 or 2 outputs, of which the first parameters, this many, are unknown; a search for
-/// them starts at 0.6 truth + 0.1.
+/// A pendulum with this process noise and 1 or 2 outputs, of which the first parameters, this many, are unknown; a
+/// search for them starts at 0.6 truth + 0.1.
 pub(super) fn pendulum_text(process: f64, outputs: usize, unknown: usize) -> String {
     let names = ["damping", "stiffness", "gain", "square", "drive"];
     let parameters = names.iter().zip(TRUTH).enumerate().map(|(index, (name, truth))| {

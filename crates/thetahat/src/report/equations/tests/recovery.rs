@@ -74,8 +74,8 @@ fn a_row_that_is_predicted_from_the_start_alone_does_not_count_ahead() {
 #[test]
 fn figures_say_whether_the_noises_are_right() {
     let model = pendulum(1, 2);
-    // The log has the noises that the model tells, twice as much, and half as much. The parts of e^2/S below 0.00098 and above
-    // 5.02 are those of normal e of this size.
+    // The log has the noises that the model tells, twice as much, and half as much. The parts of e^2/S below 0.00098
+    // and above 5.02 are those of normal e of this size.
     for (noise, mean, below, above) in
         [(1.0, 1.0, 0.025, 0.025), (2.0, 4.0, 0.013, 0.26), (0.5, 0.25, 0.05, 0.0)]
     {

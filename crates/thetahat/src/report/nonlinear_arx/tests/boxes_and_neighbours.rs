@@ -55,7 +55,8 @@ fn a_fold_is_two_planes() {
     assert!(outcome.path[1].term.starts_with("split(u(k-1), "), "{}", outcome.path[1].term);
 }
 
-/// Each way to choose their number finds more than one local model, and MDL, which asks most of a parameter, fewer than are looked at.
+/// Each way to choose their number finds more than one local model, and MDL, which asks most of a parameter, fewer than
+/// are looked at.
 #[test]
 fn their_number_is_chosen() {
     let log = folded(600, 0.2);

@@ -81,7 +81,8 @@ fn two_outputs_are_two_maps_of_the_lags_of_both() {
     assert!(own.of_output(2).is_err());
 }
 
-/// Where both maps have the same functions F, cov(theta_1, theta_2) = sigma_12 (F'F)^-1, and (F'F)^-1 = cov(theta_1)/sigma_11.
+/// Where both maps have the same functions F, cov(theta_1, theta_2) = sigma_12 (F'F)^-1, and (F'F)^-1 =
+/// cov(theta_1)/sigma_11.
 #[test]
 fn errors_that_are_common_make_parameters_covary() {
     let report = fit_nonlinear_arx(&pair(3000, 0.1), &[], &of_pair(&ALL)).unwrap();
@@ -162,7 +163,8 @@ fn a_root_of_the_output_is_a_regressor() {
     for (parameter, truth) in report.model.parameters().iter().zip([0.0, 1.0, 0.1, -0.2]) {
         assert!((parameter.value - truth).abs() < 1e-9, "{parameter:?}");
     }
-    // Deviations from offsets, divided by scales, are the same model: its free run too, which computes the root of its own output.
+    // Deviations from offsets, divided by scales, are the same model: its free run too, which computes the root of its
+    // own output.
     for plan in [plan, of_tank("sqrt(y)", Detrend::Mean)] {
         let report = fit_nonlinear_arx(&log, &[], &plan).unwrap();
         assert!(report.fit.iter().all(|fit| fit.rmse.unwrap() < 1e-9), "{:?}", report.fit);
@@ -183,7 +185,8 @@ fn a_root_of_the_output_is_a_regressor() {
     }
 }
 
-/// The square of the output as an expression, and as a product: predictions and their deviations agree, through the slope of the expression.
+/// The square of the output as an expression, and as a product: predictions and their deviations agree, through the
+/// slope of the expression.
 #[test]
 fn expressions_carry_errors_as_products_do() {
     let mut noise = Noise(23);

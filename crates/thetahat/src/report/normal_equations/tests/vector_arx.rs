@@ -107,7 +107,8 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
     }
 }
 
-/// A log that misses the values of these channels in these rows, on a clock that stops for a while, at a border and elsewhere.
+/// A log that misses the values of these channels in these rows, on a clock that stops for a while, at a border and
+/// elsewhere.
 pub(super) fn with_gaps(missing: &[(usize, usize)]) -> Log {
     let mut channels = log(1500, 3.0).channels().to_vec();
     missing.iter().for_each(|(channel, row)| channels[*channel].values[*row] = f64::NAN);

@@ -67,8 +67,8 @@ fn all(log: &Log) -> Result<[Rows; 1], Error> {
     Ok([Rows::new(1, log.rows())?])
 }
 
-/// What an independent Kalman filter says of each row k steps ahead: the predicted outputs, and their covariance. By the textbook's formulas with
-/// full inverses, from rest.
+/// What an independent Kalman filter says of each row k steps ahead: the predicted outputs, and their covariance. By
+/// the textbook's formulas with full inverses, from rest.
 fn dense(
     space: &StateSpace,
     u: &[Vec<f64>],
@@ -258,7 +258,8 @@ fn errors_are_smaller_than_after_a_restart_and_as_large_as_they_should_be() -> R
     let apart =
         complete.iter().map(|rows| Rows::new(rows.start + 1, rows.end)).collect::<Result<Vec<_>, Error>>()?;
     let cut = StateSpaceOnLog::new(&model, &whole, &apart, None)?.respond(Horizon::ONE_STEP, start)?;
-    // A state that explains a few rows best explains their noise: what counts is how far predictions are from those of the whole log.
+    // A state that explains a few rows best explains their noise: what counts is how far predictions are from those of
+    // the whole log.
     let full = log(&u, &y)?;
     let ideal = StateSpaceOnLog::new(&model, &full, &all(&full)?, None)?.respond(Horizon::ONE_STEP, start)?;
     for output in 0..2 {

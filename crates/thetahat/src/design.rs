@@ -3,8 +3,8 @@
 //! - [`TestSignal`] is a signal of some [`Waveform`] (a [`SignalKind`], and how long its values are held), made of a
 //!   [`SignalPlan`]; [`SignalFigures`] says how rich it is.
 //! - [`planned()`] is a model as it would be known after an experiment. [`compare_signals`] puts signals side by side
-//!   in an [`ExperimentDesign`]: the [`SignalWorth`] of each for some [`DesignFigure`]s, and how long each has to be for
-//!   the errors that a [`Want`] says, with its [`Limit`].
+//!   in an [`ExperimentDesign`]: the [`SignalWorth`] of each for some [`DesignFigure`]s, and how long each has to be
+//!   for the errors that a [`Want`] says, with its [`Limit`].
 //!
 //! ```
 //! use thetahat::design::{SignalFigures, SignalKind, SignalPlan, TestSignal};

@@ -393,6 +393,80 @@ fn libraries_name_no_options() {
     );
 }
 
+/// Where the variants of `Model` and of `Procedure` may be named: beside what they are, where a fit makes one, and
+/// where each kind has a presentation and a form of its own. All others ask for what a kind can do.
+const KINDS: [&str; 11] = [
+    "estimate",
+    "export",
+    "model",
+    "present::pages",
+    "present::tables",
+    "report::equations",
+    "report::nonlinear_arx",
+    "report::nonlinear_choice",
+    "report::normal_equations",
+    "report::process",
+    "report::state_space",
+];
+
+/// Variants of these enums that a source names outside of comments and tests.
+fn variants(source: &str) -> Vec<String> {
+    let code = source.lines().take_while(|line| !line.trim_start().starts_with("#[cfg(test)]"));
+    let code = code.filter(|line| !line.trim_start().starts_with("//"));
+    let mut found = Vec::new();
+    for line in code {
+        for name in ["Model::", "Procedure::"] {
+            for (at, _) in line.match_indices(name) {
+                let before = line[..at].chars().next_back();
+                let after = line[at + name.len()..].chars().next();
+                let whole = !before.is_some_and(|c| c.is_alphanumeric() || c == '_');
+                if whole && after.is_some_and(|c| c.is_ascii_uppercase()) {
+                    found.push(line.trim().to_owned());
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn kinds_are_asked_what_they_can_do() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let allowed = |module: &str| {
+        KINDS.iter().any(|room| {
+            module == *room || module.strip_prefix(room).is_some_and(|rest| rest.starts_with("::"))
+        })
+    };
+    for (folder, is_library) in [("crates/thetahat/src", true), ("cli", false), ("py/src", false)] {
+        let mut files = Vec::new();
+        files_below(&root.join(folder), &mut files);
+        for file in files {
+            let path = file.strip_prefix(root.join(folder)).expect("below").with_extension("");
+            let module = path.to_string_lossy().replace(['/', '\\'], "::");
+            if module.split("::").any(|part| part.ends_with("tests")) || is_library && allowed(&module) {
+                continue;
+            }
+            // Their one dispatch.
+            let found = variants(&fs::read_to_string(&file).expect("a source"));
+            assert!(found.is_empty() || module == "respond::kinds", "{folder}, {module}: {found:?}");
+        }
+    }
+    let source = "/// Model::Process\nlet Model::Process(p) = m;\nStateModel::From\nModel::of\n#[cfg(test)]\nModel::Process";
+    assert_eq!(variants(source), ["let Model::Process(p) = m;"]);
+}
+
+/// The sources below a folder.
+fn files_below(folder: &Path, found: &mut Vec<std::path::PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            files_below(&path, found);
+        } else if path.extension().is_some_and(|kind| kind == "rs") {
+            found.push(path);
+        }
+    }
+}
+
 /// The features of each package, once for each set of them, as `cargo tree` says for these packages.
 fn features(packages: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     let tree = ["tree", "--locked", "--offline", "--no-dedupe", "--prefix", "none", "--format", "{p}|{f}"];

@@ -46,6 +46,7 @@ pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
 pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
+pub(crate) use kind::FilterForm;
 pub use kind::Model;
 pub use linear::LinearModel;
 pub(crate) use nonlinear_arx::Evaluator;

@@ -7,7 +7,7 @@ use thetahat_core::{Covariance, LinearTransition};
 
 use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
-use crate::model::{PolynomialModel, Signal, StateSpace};
+use crate::model::{Signal, StateSpace};
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 
@@ -72,12 +72,6 @@ impl Linear {
         let all = vec![true; frame.names.outputs.len()];
         correlation.full = decorrelated(&transition, &correlation, &frame, &all)?;
         Ok((frame, Self { transition, correlation: Some(correlation) }))
-    }
-
-    /// A fitted model of polynomials: see [`of_innovations`](Self::of_innovations).
-    pub(super) fn of_model(model: &PolynomialModel, start: InitialState) -> Result<(Frame, Self), Error> {
-        let outputs = std::slice::from_ref(&model.output);
-        Self::of_innovations(model.state_space(), (&model.inputs, outputs), start)
     }
 
     /// A fitted model in innovations form: Q = K R K', S = K R, R = cov e.

@@ -4,7 +4,7 @@ use super::lags::Lags;
 use super::linear::Linear;
 use super::matrices;
 use crate::Error;
-use crate::model::{GreyBox, Model, equations::Document};
+use crate::model::{FilterForm, GreyBox, equations::Document};
 use crate::report::Report;
 
 /// A model with a state, for a [`StateFilter`](super::StateFilter).
@@ -88,35 +88,21 @@ impl StateModel {
     /// [`Error::Report`] if the noise variance is 0, or the numbers overflow; [`Error::Argument`] for a start of
     /// equations.
     pub fn from_report(report: &Report, start: Option<InitialState>) -> Result<Self, Error> {
-        match &report.model {
-            Model::Polynomial(model) => {
-                let start = start.unwrap_or(InitialState::Unknown);
-                Ok(Linear::of_model(model, start)?.into())
+        let model = &report.model;
+        let from = start.unwrap_or(InitialState::Unknown);
+        Ok(match model.filter_form()? {
+            FilterForm::Innovations(space) => {
+                Linear::of_innovations(*space, (model.inputs(), model.outputs()), from)?.into()
             }
-            Model::Equations(_) if start.is_some() => Err(Error::argument(
-                "initial",
-                "a model in equations says itself where its states start; leave it out, or change its text",
-            )),
-            Model::Equations(model) => Ok(model.with_values()?.into()),
-            Model::Process(model) => {
-                let start = start.unwrap_or(InitialState::Unknown);
-                Ok(Linear::of_model(&model.linear()?, start)?.into())
+            FilterForm::Lags(model) => Lags::of_model(model, from)?.into(),
+            FilterForm::Equations(_) if start.is_some() => {
+                return Err(Error::argument(
+                    "initial",
+                    "a model in equations says itself where its states start; leave it out, or change its text",
+                ));
             }
-            Model::StateSpace(model) => {
-                let start = start.unwrap_or(InitialState::Unknown);
-                let signals = (&*model.inputs, &*model.outputs);
-                Ok(Linear::of_innovations(model.matrices(), signals, start)?.into())
-            }
-            Model::ContinuousStateSpace(model) => {
-                let start = start.unwrap_or(InitialState::Unknown);
-                let sampled = model.sampled(model.sample_time, model.hold)?;
-                let signals = (&*sampled.inputs, &*sampled.outputs);
-                Ok(Linear::of_innovations(sampled.matrices(), signals, start)?.into())
-            }
-            Model::NonlinearArx(model) => {
-                Ok(Lags::of_model(model, start.unwrap_or(InitialState::Unknown))?.into())
-            }
-        }
+            FilterForm::Equations(model) => (*model).into(),
+        })
     }
 
     /// The same, and outputs that are measured with white noise of these standard deviations, in units of the outputs,

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::equations::EquationsModel;
+use super::equations::{EquationsModel, GreyBox};
 use super::fitted::{Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
@@ -34,6 +34,16 @@ pub enum Model {
     StateSpace(Box<StateSpaceModel>),
     /// A state in continuous time, with any number of outputs: what a model of another kind was converted to.
     ContinuousStateSpace(Box<ContinuousStateSpaceModel>),
+}
+
+/// What a filter of a model's state runs on.
+pub(crate) enum FilterForm<'m> {
+    /// x(t+1) = F x + G u + K e, y = H x + D u + e.
+    Innovations(Box<StateSpace>),
+    /// The equations, with the values that were found.
+    Equations(Box<GreyBox>),
+    /// A map of past outputs and inputs, which are the state.
+    Lags(&'m NonlinearArxModel),
 }
 
 impl From<StateSpaceModel> for Model {
@@ -292,6 +302,24 @@ impl Model {
                 ),
             )),
         }
+    }
+
+    /// What a filter of its state runs on.
+    ///
+    /// # Errors
+    /// As for [`linear`](Self::linear) of a process that has no transfer function; [`Error::Argument`] if a model in
+    /// continuous time cannot be sampled; [`Error::Report`] if equations lack a value.
+    pub(crate) fn filter_form(&self) -> Result<FilterForm<'_>, Error> {
+        Ok(match self {
+            Self::Polynomial(model) => FilterForm::Innovations(Box::new(model.state_space())),
+            Self::Process(model) => FilterForm::Innovations(Box::new(model.linear()?.state_space())),
+            Self::StateSpace(model) => FilterForm::Innovations(Box::new(model.matrices())),
+            Self::ContinuousStateSpace(model) => {
+                FilterForm::Innovations(Box::new(model.sampled(model.sample_time, model.hold)?.matrices()))
+            }
+            Self::Equations(model) => FilterForm::Equations(Box::new(model.with_values()?)),
+            Self::NonlinearArx(model) => FilterForm::Lags(model),
+        })
     }
 
     /// How inputs go on between samples, of what is in continuous time and says it.

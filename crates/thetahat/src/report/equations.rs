@@ -258,7 +258,7 @@ fn fit(
         data,
         selection: None,
         decisions: Vec::new(),
-        model: Model::Equations(fitted.clone()),
+        model: Model::from(fitted.clone()),
         estimation,
         fit: Vec::new(),
         purpose: String::new(),

@@ -28,7 +28,10 @@ fn models() -> Vec<PolynomialModel> {
 }
 
 fn filter(model: &PolynomialModel) -> StateFilter {
-    let linear = Linear::of_model(model, InitialState::Zero).unwrap();
+    let linear = {
+        let signals = (&*model.inputs, std::slice::from_ref(&model.output));
+        Linear::of_innovations(model.state_space(), signals, InitialState::Zero).unwrap()
+    };
     StateFilter::new(linear.into(), Estimator::Kalman).unwrap()
 }
 

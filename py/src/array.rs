@@ -24,7 +24,7 @@ pub(crate) fn numbers<'py>(
             Ok(array.clone())
         }
         _ => {
-            let conversion = CONVERSION.import(value.py(), "thetahat._numbers", "array")?;
+            let conversion = CONVERSION.import(value.py(), "thetahat.base.numbers", "array")?;
             Ok(calling(value.py(), || conversion.call1((argument, value)))?.cast_into()?)
         }
     }

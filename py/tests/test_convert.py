@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from thetahat import _convert
+from thetahat.models import convert as _convert
 
 SAMPLE_TIME = 0.1
 # SciPy's simulation takes the zero of an input without effect for a coefficient that vanished.

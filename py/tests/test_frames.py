@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import thetahat as th
-from thetahat import _frames
+from thetahat.base import frames as _frames
 
 NAN = float("nan")
 BEGIN = datetime.datetime(2024, 3, 1, 12, 0, 0, 250_000)

@@ -161,7 +161,7 @@ def counting(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         taken.append(Path(path).name)
         return th.read_csv(path, **options)
 
-    monkeypatch.setattr("thetahat._many.read_csv", noted)
+    monkeypatch.setattr("thetahat.fits.many.read_csv", noted)
     return taken
 
 

@@ -19,7 +19,8 @@ import pytest
 from numpy.typing import NDArray
 
 import thetahat as th
-from thetahat import _numbers, plot
+from thetahat import plot
+from thetahat.base import numbers as _numbers
 from thetahat.sklearn import ARXRegressor
 
 Array = NDArray[np.float64]

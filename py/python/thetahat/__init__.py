@@ -19,27 +19,9 @@ fitted or written model and a `Tracker` a recursive model with the channels and 
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 """
 
-from thetahat._control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
-from thetahat._design import ExperimentDesign, TestSignal, design
-from thetahat._filter import StateEstimate, StateFilter, StateTrajectory
-from thetahat._fit import EstimationWarning, ar, arma, armax, arx, bj, fir, fit, general, oe, search
-from thetahat._grey_box import GreyBox, grey
-from thetahat._evaluation import Comparison, Finding, Inspection, Validation, compare, inspect
-from thetahat._instrumental import iv, sriv
-from thetahat._log import Log
-from thetahat._many import Fits, fit_many
-from thetahat._model import Model
-from thetahat._narx import narx
-from thetahat._normal_equations import NormalEquations
-from thetahat._options import DesignOptions, EquationsOptions, FitOptions, NarxOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
-from thetahat._process import process, tf
-from thetahat._read import dc_motor, read_csv, read_log
-from thetahat._report import Decision
-from thetahat._responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
-from thetahat._spectrum import MeasuredResponse, spectrum
-from thetahat._state_model import StateModel
-from thetahat._state_space import ss
-from thetahat._step_test import StepTest, step_test
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from thetahat._thetahat import (
     Alarm,
     ChangeDetector,
@@ -71,10 +53,46 @@ from thetahat._thetahat import (
     WindowedLeastSquares,
     __version__,
 )
-from thetahat._topics import Topic, topics
-from thetahat._track import Tracker
-from thetahat._tracked import Tracked, TrackTrajectory
-from thetahat._tune import Tuning, tune
+from thetahat.base.said import EstimationWarning
+from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
+from thetahat.controllers.tune import Tuning, tune
+from thetahat.engine.options import (
+    DesignOptions,
+    EquationsOptions,
+    FitOptions,
+    NarxOptions,
+    ReadOptions,
+    SpectrumOptions,
+    StepTestOptions,
+    ValidationOptions,
+)
+from thetahat.experiments.design import ExperimentDesign, TestSignal, design
+from thetahat.experiments.spectrum import MeasuredResponse, spectrum
+from thetahat.experiments.step_test import StepTest, step_test
+from thetahat.fits.comparison import Comparison, compare
+from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
+from thetahat.fits.grey_box import GreyBox, grey
+from thetahat.fits.instrumental import iv, sriv
+from thetahat.fits.many import Fits, fit_many
+from thetahat.fits.narx import narx
+from thetahat.fits.normal_equations import NormalEquations
+from thetahat.fits.process import process, tf
+from thetahat.fits.state_space import ss
+from thetahat.logs.inspection import Finding, Inspection, inspect
+from thetahat.logs.log import Log
+from thetahat.logs.read import dc_motor, read_csv, read_log
+from thetahat.logs.topics import Topic, topics
+from thetahat.models.model import Model
+from thetahat.models.report import Decision
+from thetahat.models.responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
+from thetahat.models.validation import Validation
+from thetahat.online.filter import StateEstimate, StateFilter, StateTrajectory
+from thetahat.online.state_model import StateModel
+from thetahat.online.track import Tracker
+from thetahat.online.tracked import Tracked, TrackTrajectory
+
+if TYPE_CHECKING:
+    from thetahat import dask as dask, plot as plot, sklearn as sklearn
 
 __all__ = [
     "Alarm",
@@ -177,3 +195,21 @@ __all__ = [
     "topics",
     "tune",
 ]
+
+_LATER = ("dask", "plot", "sklearn")
+"""Modules that load when they are first asked for: each needs a package that not everybody has."""
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name):
+        if name not in _LATER:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        try:
+            return import_module(f"thetahat.{name}")
+        except ImportError as error:
+            # Who asks what a module has, as `help` does, passes over what is not there.
+            raise AttributeError(str(error)) from error
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, *_LATER])

@@ -1,11 +1,9 @@
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, final, type_check_only
+from typing import Any, Literal, Protocol, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from thetahat._model import Model as _FittedModel
 
 __all__ = [
     "CRITERIA",
@@ -691,6 +689,11 @@ class WindowedLeastSquares:
     @property
     def block(self) -> int: ...
 
+@type_check_only
+class _Fitted(Protocol):
+    @property
+    def _model(self) -> Model: ...
+
 @final
 class RecursiveNarx(_RecursiveModel):
     def __new__(
@@ -717,7 +720,7 @@ class RecursiveNarx(_RecursiveModel):
         limits: Sequence[tuple[float, float] | None] | None = None,
     ) -> RecursiveNarx: ...
     @staticmethod
-    def from_model(model: _FittedModel, forgetting: float | Forgetting | None = 0.99) -> RecursiveNarx: ...
+    def from_model(model: _Fitted, forgetting: float | Forgetting | None = 0.99) -> RecursiveNarx: ...
     @property
     def terms(self) -> list[list[int]]: ...
     def output_at(self, regressors: ArrayLike) -> float: ...

@@ -34,15 +34,18 @@ import numpy
 import pandas
 from dask.delayed import Delayed
 
-from thetahat import _many, _options, _said, _thetahat
-from thetahat._fit import ar, arma, armax, arx, bj, fir, general, oe, search, told, words
-from thetahat._grey_box import GreyBox, grey
-from thetahat._log import Log
-from thetahat._model import Model
-from thetahat._normal_equations import NormalEquations as _NormalEquations
-from thetahat._normal_equations import both_horizons
-from thetahat._options import EquationsOptions
-from thetahat._state_space import ss
+from thetahat import _thetahat
+from thetahat.base import said as _said
+from thetahat.engine import options as _options
+from thetahat.engine.options import EquationsOptions
+from thetahat.fits import many as _many
+from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, general, oe, search, told, words
+from thetahat.fits.grey_box import GreyBox, grey
+from thetahat.fits.normal_equations import NormalEquations as _NormalEquations
+from thetahat.fits.normal_equations import both_horizons
+from thetahat.fits.state_space import ss
+from thetahat.logs.log import Log
+from thetahat.models.model import Model
 
 __all__ = ["fit_experiments", "fit_many", "normal_equations", "rows"]
 

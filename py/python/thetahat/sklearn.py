@@ -25,7 +25,13 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat import Log, Model, NarxOptions, _clock, _numbers, arx, narx, ss
+from thetahat.base import clock as _clock, numbers as _numbers
+from thetahat.engine.options import NarxOptions
+from thetahat.fits.fit import arx
+from thetahat.fits.narx import narx
+from thetahat.fits.state_space import ss
+from thetahat.logs.log import Log
+from thetahat.models.model import Model
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
-    from thetahat._options import Band, Bound, Rows
+    from thetahat.engine.options import Band, Bound, Rows
 
 __all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor", "StateSpaceRegressor"]
 

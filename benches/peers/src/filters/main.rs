@@ -11,6 +11,7 @@
 mod signals;
 
 mod data;
+mod kalman;
 mod nalgebra_form;
 mod ours;
 mod peers;

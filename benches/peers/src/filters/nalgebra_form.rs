@@ -6,7 +6,7 @@ use std::fmt::Debug;
 use nalgebra::{RealField, SMatrix, SVector};
 
 use crate::data::{FORGETTING, Model, PRIOR};
-use crate::peers::{Kalman, rows};
+use crate::kalman::{Kalman, rows};
 
 /// A matrix of nalgebra from rows.
 pub(crate) fn matrix<T: RealField + Copy, const R: usize, const C: usize>(

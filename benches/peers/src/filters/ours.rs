@@ -7,8 +7,8 @@ use thetahat_core::{
 };
 
 use crate::data::{FORGETTING, Model};
+use crate::kalman::{Kalman, rows};
 use crate::nalgebra_form::{LeastSquares, matrix};
-use crate::peers::{Kalman, rows};
 
 /// The Kalman filter and its models.
 pub(crate) struct OurKalman<T: Real, const N: usize, const M: usize> {

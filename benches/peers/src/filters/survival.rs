@@ -3,7 +3,8 @@
 use nalgebra::SMatrix;
 
 use crate::data::{self, Model};
-use crate::peers::{Kalman, Visit, visit_all};
+use crate::kalman::Kalman;
+use crate::peers::{Visit, visit_all};
 
 /// Until this step the covariance is examined after every step, then after every thousandth.
 const EXAMINED: usize = 1_000_000;

@@ -9,9 +9,10 @@ use nalgebra::{Const, DimMin, SVector};
 
 use crate::Result;
 use crate::data::{self, Model, SAMPLES};
+use crate::kalman::Kalman;
 use crate::nalgebra_form::{InPlaceLeastSquares, LeastSquares, PlainLeastSquares};
 use crate::ours::OurLeastSquares;
-use crate::peers::{Kalman, Visit, visit_all};
+use crate::peers::{Visit, visit_all};
 
 /// Passes over the record in a block: 20,000 steps, a few milliseconds, so that some blocks are undisturbed.
 const PASSES: usize = 10;

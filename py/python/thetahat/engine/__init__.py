@@ -1,0 +1,1 @@
+"""What the engine takes and gives: keyword arguments as its options, files, documents."""

@@ -1,0 +1,1 @@
+"""What experiments show without a fit, and test signals for them."""

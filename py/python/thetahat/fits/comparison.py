@@ -1,0 +1,77 @@
+"""Several models side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from thetahat import _thetahat
+from thetahat.engine import options as _options
+from thetahat.engine.document import Document
+from thetahat.engine.options import Rows, ValidationOptions
+from thetahat.experiments.spectrum import MeasuredResponse
+from thetahat.logs.log import Log, handle
+from thetahat.models.model import Model
+
+
+class Comparison(Document):
+    """Several models side by side on a log: the document of ``thetahat compare``."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a careful reader should know, in plain words, with the model that it is about."""
+        models = self.document["models"]
+        return [f"{model['report']}: {_thetahat.in_python(text)}" for model in models for text in model["warnings"]]
+
+    def __repr__(self) -> str:
+        return f"Comparison({', '.join(str(model['report']) for model in self.document['models'])})"
+
+
+def compare(
+    models: Mapping[str, Model] | Sequence[Model],
+    log: Log,
+    *,
+    rows: Rows | None = None,
+    detrend: str | None = None,
+    horizon: int | Sequence[int] | None = None,
+    lags: int | None = None,
+    alpha: float | None = None,
+    alphas: Sequence[float] | None = None,
+    over: MeasuredResponse | None = None,
+) -> Comparison:
+    """Put several fitted models side by side on a log.
+
+    Parameters
+    ----------
+    models : dict of str to Model, or sequence of Model
+        The models, with the names that they have in the table.
+    log : Log
+        The data.
+    rows, detrend, horizon, lags, alpha, alphas
+        What to validate on and how, see `thetahat.ValidationOptions`.
+    over : MeasuredResponse, optional
+        A frequency response, as `spectrum` finds it, to lay the models over: how many of its points each misses.
+
+    Returns
+    -------
+    Comparison
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> log = th.dc_motor()
+    >>> models = {"arx": th.arx(log[:700], na=2, nb=2), "oe": th.oe(log[:700], nb=2, nf=2)}
+    >>> th.compare(models, log[700:])
+    Comparison(arx, oe)
+    """
+    words = _options.words(ValidationOptions, locals(), len(log) if isinstance(log, Log) else None)
+    named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
+    if not named:
+        raise ValueError("models: there is none; give at least one")
+    for model in named.values():
+        if not isinstance(model, Model):
+            raise TypeError(f"models: expected a Model, found {type(model).__name__}")
+    handles = [(_options.text("models", name), model._model) for name, model in named.items()]
+    if over is not None and not isinstance(over, MeasuredResponse):
+        raise TypeError(f"over: expected a MeasuredResponse, found {type(over).__name__}")
+    response = None if over is None else over.to_json()
+    return Comparison(*_thetahat.compare(handles, handle("log", log), words, response))

@@ -1,0 +1,691 @@
+"""Fits: from a log to a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from thetahat import _thetahat
+from thetahat.base import said as _said
+from thetahat.base.said import EstimationWarning
+from thetahat.engine import options as _options
+from thetahat.engine.options import Band, Bound, FitOptions, Order, Orders, Rows
+from thetahat.logs.log import Log, handle
+from thetahat.models.model import Model
+
+
+def arx(
+    log: Log,
+    na: Order,
+    nb: Orders,
+    nk: Orders = 1,
+    *,
+    couple: str | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+) -> Model:
+    """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
+
+    With several outputs A and B are polynomials with matrices for coefficients; the model is one in state space that has them, and
+    its report names them.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na : int
+        Coefficients of A: past outputs; with several outputs a range too, among which the least MDL chooses.
+    nb : int, or one for each input
+        Coefficients of B.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    couple : {"full", "none", "auto"}, optional
+        With several outputs: whether an output depends on the past of all or of its own. "auto", which is taken unless it is said: what
+        has the least MDL.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound
+        What to fit to and how, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the parameters, which are named, or the log has too few rows for them.
+    ValueError
+        If an argument does not make sense, or no row to fit to has a value in every channel.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    Notes
+    -----
+    The normal equations are made of lagged products and corrected with true residuals; where they are not exact enough, QR
+    takes over. O(N (na + nb)) operations. Ljung, System Identification, 2nd ed. 1999, section 7.3.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.arx(th.dc_motor(), na=2, nb=2, estimate="1..700")
+    >>> model.parameters.round(4)
+    array([-1.5407,  0.5765,  0.3601,  0.3174])
+    >>> model.parameter_names
+    ['a1', 'a2', 'b1', 'b2']
+
+    With two outputs, of which the second follows the first:
+
+    >>> import numpy as np
+    >>> rng = np.random.default_rng(0)
+    >>> u, y = rng.normal(size=500), np.zeros((500, 2))
+    >>> for k in range(1, 500):
+    ...     y[k] = [0.8 * y[k - 1, 0] + u[k - 1], 0.5 * y[k - 1, 1] + 0.3 * y[k - 1, 0]]
+    ...     y[k] += 0.1 * rng.normal(size=2)
+    >>> found = th.arx(th.Log(y, u, sample_time=1), na=1, nb=1)
+    >>> [round(entry["value"], 1) for entry in found.document["estimation"]["a"][0][1]]
+    [-0.3, -0.5]
+    >>> [round(found.dc_gain(output=name)[0]) for name in found.outputs]
+    [5, 3]
+    """
+    if isinstance(log, Log) and len(log.outputs) > 1:
+        options = {name: value for name, value in locals().items() if name not in ("na", "nb", "nk")}
+        coupling = [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
+        words = ["--model=arx", *_options.order_words(na=na, nb=nb, nk=nk), *coupling]
+        words += _options.words(FitOptions, options, len(log))
+        found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
+        for warning in found._model.warnings():
+            _said.warn(warning, EstimationWarning, stacklevel=2)
+        return found
+    if couple is not None:
+        raise ValueError("couple: it is for logs with several outputs; leave it out")
+    return _fit("arx", locals())
+
+
+def armax(
+    log: Log,
+    na: int,
+    nb: Orders,
+    nc: int,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit an ARMAX model, A(q) y(t) = B(q) u(t) + C(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nb, nc : int
+        Coefficients of A, B and C; nb may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, search,
+    max_iterations, tolerance, step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.armax(th.dc_motor(), na=2, nb=2, nc=1)
+    >>> model.c.round(3)
+    array([ 1.   , -0.628])
+    """
+    return _fit("armax", locals())
+
+
+def oe(
+    log: Log,
+    nb: Orders,
+    nf: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit an output error model, y(t) = B(q)/F(q) u(t) + e(t), by prediction errors.
+
+    Standard errors hold for coloured noise too.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    nb, nf : int, or one for each input
+        Coefficients of B and F.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.oe(th.dc_motor(), nb=2, nf=2).structure
+    'oe'
+    """
+    return _fit("oe", locals())
+
+
+def bj(
+    log: Log,
+    nb: Orders,
+    nc: int,
+    nd: int,
+    nf: Orders,
+    nk: Orders = 1,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit a Box-Jenkins model, y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    nb, nc, nd, nf : int
+        Coefficients of B, C, D and F; nb and nf may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect.
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
+    step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.bj(th.dc_motor(), nb=2, nc=0, nd=1, nf=2)
+    >>> abs(model.poles()).round(2)
+    array([0.89, 0.69])
+    """
+    return _fit("bj", locals())
+
+
+def ar(
+    log: Log,
+    na: int,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+) -> Model:
+    """Fit an autoregressive model of a time series, A(q) y(t) = e(t); inputs of the log are left out.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na : int
+        Coefficients of A.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
+    noise_bound
+        What to fit to and how, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> y = 0.9 ** np.arange(50) * np.cos(0.3 * np.arange(50))
+    >>> bool(np.isclose(th.ar(th.Log(y), na=2, detrend="none").a[1], -1.8 * np.cos(0.3)))
+    True
+    """
+    return _fit("ar", locals())
+
+
+def arma(
+    log: Log,
+    na: int,
+    nc: int,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    norm: float | str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit an ARMA model of a time series, A(q) y(t) = C(q) e(t); inputs of the log are left out.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nc : int
+        Coefficients of A and C.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, search, max_iterations,
+    tolerance, step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.arma(th.dc_motor(), na=2, nc=1).orders["nc"]
+    1
+
+    Missing outputs are no gaps to the exact likelihood, and no sample is left out:
+
+    >>> import numpy as np
+    >>> y = th.dc_motor()["y"].copy()
+    >>> y[::4] = np.nan
+    >>> model = th.arma(th.Log(y), na=2, nc=1, likelihood="exact")
+    >>> model.method, model.samples
+    ('exact-likelihood', 750)
+    """
+    return _fit("arma", locals())
+
+
+def general(
+    log: Log,
+    na: int = 0,
+    nb: Orders | None = None,
+    nc: int = 0,
+    nd: int = 0,
+    nf: Orders | None = None,
+    nk: Orders | None = None,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit the general model, A(q) y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    na, nb, nc, nd, nf : int
+        Coefficients of the polynomials; nb and nf may be one for each input.
+    nk : int, or one for each input
+        Samples from input to first effect: 1, unless said otherwise.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.general(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
+    'general'
+    """
+    return _fit("general", locals())
+
+
+def fir(
+    log: Log,
+    taps: int | Sequence[int],
+    kernel: str | None = "dc",
+    nk: Orders = 0,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+) -> Model:
+    """Fit an impulse response, y(t) = g(0) u(t - nk) + g(1) u(t - nk - 1) + ... + e(t), by regularised least squares.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    taps : int, or one for each input
+        How many values the response has.
+    kernel : {"dc", "tc"} or None, default "dc"
+        What is known of it before the data: that it decays and is smooth. Decay and smoothness each have a number of their own
+        ("dc"), or one for both ("tc"), which the likelihood says. None is least squares.
+    nk : int, or one for each input, default 0
+        Samples from input to first effect.
+    estimate, validate, split, detrend, offset, initial, constant, trend
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        A polynomial model, B alone: its impulse, step and frequency responses have bands.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Notes
+    -----
+    Chen, Ohlsson and Ljung, Automatica 48, 2012.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.fir(th.dc_motor(), taps=30)
+    >>> model.method
+    'regularised'
+    >>> len(model.parameters)
+    30
+    """
+    words = _options.order_words(taps=taps)
+    words.append(f"--kernel={'none' if kernel is None else _options.text('kernel', kernel)}")
+    return _fit("fir", locals(), *words)
+
+
+def fit(
+    log: Log,
+    *,
+    narx: str | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Fit the model that the data ask for.
+
+    Delay, structure and orders are chosen. A step test may come to a process in continuous time (see `process`), so may a level that follows
+    the sum of its input; a plant of many modes to a model in state space (see `ss`), one that is far from linear to a nonlinear ARX model
+    (see `narx`). What was found in the log and what was done because of it is in `Model.decisions`, what was compared in `Model.selection`.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    narx : {"none"}, optional
+        No nonlinear model.
+    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, time_limit
+        What to fit to and what the model is for, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        The one that was chosen, fitted to all rows but those of a test part.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> th.fit(th.dc_motor()).kind
+    'polynomial'
+    """
+    more = [] if narx is None else [f"--narx={_options.text('narx', narx)}"]
+    if isinstance(log, Log) and len(log.outputs) > 1 and not log.inputs:
+        *others, last = log.outputs
+        raise ValueError(
+            f"log: {', '.join(others)} and {last} are all outputs, and there is no input; give the inputs apart, as "
+            f"Log(frame[{last!r}], frame[{others!r}])"
+        )
+    return _fit(None, locals(), *more)
+
+
+def search(
+    log: Log,
+    model: str | None = None,
+    *,
+    na: Orders | None = None,
+    nb: Orders | None = None,
+    nc: Orders | None = None,
+    nd: Orders | None = None,
+    nf: Orders | None = None,
+    nk: Orders | None = None,
+    select: str | None = None,
+    path: str | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    prefilter: Band | None = None,
+    initial: str | None = None,
+    likelihood: str | None = None,
+    constant: str | None = None,
+    trend: bool | None = None,
+    focus: str | int | None = None,
+    norm: float | str | None = None,
+    bound: Mapping[str, Bound] | None = None,
+    dc_gain: Bound | Mapping[str, Bound] | None = None,
+    ridge: float | None = None,
+    noise_bound: float | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Choose a model among many, all compared on the same samples.
+
+    Without orders the data choose delay, structure and orders, as `fit` has it. `Model.selection` holds what was compared.
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    model : {"arx", "armax", "oe", "bj", "ar", "arma", "general"}, optional
+        The structure: ARX where orders are given, unless said otherwise.
+    na, nb, nc, nd, nf, nk : int or range
+        Orders, or those among which to choose: ``range(1, 9)`` is 1 to 8. nb, nf and nk may be one for each input.
+    select : {"mdl", "aic", "aicc", "fpe", "hqc", "validation", "cv"}
+        What makes one model better than another: MDL, unless said otherwise.
+    path : {"all", "alternate"}
+        Which are tried: all of them, or one order up at a time.
+    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
+    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+        What to fit to and how to search, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        The one that was chosen, fitted to all rows but those of a test part.
+
+    Raises
+    ------
+    EstimationError, ValueError
+        As for `arx`.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> model = th.search(th.dc_motor(), model="oe", nb=range(1, 4), nf=range(1, 4), nk=range(1, 3))
+    >>> model.selection["models"]
+    17
+    """
+    more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
+    return _fit(model, locals(), *more)
+
+
+def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
+    """A fit by one of the functions above, with its arguments: the log, orders and options."""
+    log = arguments["log"]
+    data = handle("log", log)
+    return told(Model._of(_thetahat.fit(data, [*words(model, arguments, len(log)), *more])), stacklevel=4)
+
+
+def words(model: str | None, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
+    """Orders and options of one of the functions above as those of the command line."""
+    orders = {name: arguments[name] for name in ("na", "nb", "nc", "nd", "nf", "nk") if name in arguments}
+    named = [] if model is None else [f"--model={_options.text('model', model)}"]
+    return [*named, *_options.order_words(**orders), *_options.words(FitOptions, arguments, rows)]
+
+
+def told(fitted: Model, stacklevel: int) -> Model:
+    """A model of whose warnings the caller is told."""
+    for warning in fitted._model.warnings():
+        _said.warn(warning, EstimationWarning, stacklevel=stacklevel)
+    return fitted

@@ -1,0 +1,414 @@
+"""Models in equations, of which some parameters may be unknown, and their fits."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
+from types import SimpleNamespace
+from typing import Any, Union
+
+import numpy as np
+
+from thetahat import _thetahat
+from thetahat.base import said as _said
+from thetahat.base.said import EstimationWarning
+from thetahat.engine import files as _files, options as _options
+from thetahat.engine.options import EquationsOptions, Rows
+from thetahat.logs.log import Log, handle
+from thetahat.models.model import Model
+
+_FUNCTIONS = {
+    np.sin: "sin",
+    np.cos: "cos",
+    np.tan: "tan",
+    np.arcsin: "asin",
+    np.arccos: "acos",
+    np.arctan: "atan",
+    np.sinh: "sinh",
+    np.cosh: "cosh",
+    np.tanh: "tanh",
+    np.exp: "exp",
+    np.log: "ln",
+    np.log10: "log10",
+    np.sqrt: "sqrt",
+    np.absolute: "abs",
+    np.sign: "sign",
+    np.arctan2: "atan2",
+    np.minimum: "min",
+    np.maximum: "max",
+}
+_SIGNS = {np.add: "+", np.subtract: "-", np.multiply: "*", np.true_divide: "/", np.power: "^"}
+
+
+class Expression(np.lib.mixins.NDArrayOperatorsMixin):
+    """What a function of a model in equations computes with: a text that grows with each operation.
+
+    It takes part in ``+ - * / **`` and in NumPy's functions; it has no value, so there is no ``if`` on it.
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
+
+    __repr__ = __str__
+
+    def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        if method != "__call__" or options:
+            return NotImplemented
+        texts = [_text_of(value) for value in inputs]
+        if function in _SIGNS:
+            return Expression(f"({texts[0]} {_SIGNS[function]} {texts[1]})")
+        if function is np.negative:
+            return Expression(f"(-{texts[0]})")
+        if function is np.positive:
+            return self
+        if function is np.square:
+            return Expression(f"({texts[0]} * {texts[0]})")
+        if function in _FUNCTIONS:
+            return Expression(f"{_FUNCTIONS[function]}({', '.join(texts)})")
+        raise TypeError(f"{function.__name__}: equations have {', '.join(sorted(_FUNCTIONS.values()))} and + - * / **")
+
+    def __bool__(self) -> bool:
+        raise TypeError("an expression has no value to branch on; use np.minimum, np.maximum, np.sign or abs")
+
+    def __float__(self) -> float:
+        raise TypeError("an expression has no value; use NumPy's functions, such as np.sin")
+
+
+def _text_of(value: Any) -> str:
+    if isinstance(value, Expression):
+        return str(value)
+    number = _number("expression", value)
+    return f"({number!r})" if number < 0 else repr(number)
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name}: expected a number, found {value!r}")
+    return float(value)
+
+
+class GreyBox:
+    """A model of a plant in equations, of which some parameters may be unknown, as ``thetahat fit --grey`` reads it.
+
+    Parameters
+    ----------
+    model : str, path or dict
+        A text in TOML, a file with one, or a dict with the same entries: ``sample_time``, ``states``, ``inputs``, ``parameters``,
+        ``next`` or ``derivative``, ``outputs``, ``noise``. The manual of ``thetahat filter`` says what each is.
+
+    Raises
+    ------
+    ValueError
+        If it is no such model: with line and column, and what to do.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> tank = th.GreyBox({
+    ...     "sample_time": 1,
+    ...     "states": {"level": {"start": 0, "sd": 0.1}},
+    ...     "inputs": {"flow": "u"},
+    ...     "parameters": {"area": {"start": 1, "sd": 1, "unknown": True, "min": 0}},
+    ...     "derivative": {"level": "(flow - 0.1 * level) / area"},
+    ...     "outputs": {"y": "level"},
+    ...     "noise": {"measurement": {"y": 0.01}},
+    ... })
+    >>> tank
+    GreyBox(states level, inputs u, outputs y, unknown area)
+    """
+
+    __slots__ = ("_model",)
+    _model: _thetahat.GreyBox
+
+    def __init__(self, model: str | os.PathLike[str] | Mapping[str, Any]) -> None:
+        if isinstance(model, Mapping):
+            text = _toml(_plain("model", model))
+        elif isinstance(model, str) and ("\n" in model or "=" in model):
+            text = model
+        else:
+            with open(_files.name(model), encoding="utf-8") as file:
+                text = file.read()
+        self._model = _thetahat.GreyBox(text)
+
+    @classmethod
+    def from_functions(
+        cls,
+        *,
+        sample_time: float,
+        states: Mapping[str, Mapping[str, float] | tuple[float, float]],
+        outputs: Callable[..., Mapping[str, Any]],
+        measurement: Mapping[str, float],
+        derivative: Callable[..., Mapping[str, Any]] | None = None,
+        next: Callable[..., Mapping[str, Any]] | None = None,
+        inputs: Sequence[str] | Mapping[str, str] = (),
+        parameters: Mapping[str, Any] | None = None,
+        process: Mapping[str, float] | None = None,
+        substeps: int | None = None,
+    ) -> GreyBox:
+        """A model whose equations are functions of Python.
+
+        They are called once, with expressions in the place of numbers, and what they compute is the model: nothing of Python runs in
+        a fit, and derivatives are exact.
+
+        Parameters
+        ----------
+        sample_time : float
+            Seconds from one sample to the next.
+        states : dict of str to (float, float) or dict
+            Of each state what is known at the first row: its value and its standard deviation.
+        outputs : callable
+            ``outputs(x, u, p)`` gives a dict of the channels that are measured: what each is.
+        measurement : dict of str to float
+            The standard deviation of each output's noise.
+        derivative, next : callable
+            One of the two. ``derivative(x, u, p)`` gives a dict of dx/dt; ``next(x, u, p, dt)`` one of the states after ``dt`` seconds.
+            ``x``, ``u`` and ``p`` have the states, inputs and parameters as attributes.
+        inputs : sequence of str, or dict of str to str
+            The channels that are inputs, or by the names that the functions use.
+        parameters : dict of str to float or dict
+            A number, or what is known of an unknown one: ``{"start": 1, "sd": 1, "unknown": True, "min": 0}``.
+        process : dict of str to float, optional
+            The standard deviation of what a sample adds to each state.
+        substeps : int, optional
+            Steps of the integration from row to row, of ``derivative``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> pendulum = th.GreyBox.from_functions(
+        ...     sample_time=0.05,
+        ...     states={"angle": (0, 0.1), "rate": (0, 0.1)},
+        ...     inputs={"torque": "u"},
+        ...     parameters={"stiffness": {"start": 6, "sd": 3, "unknown": True, "min": 0}},
+        ...     derivative=lambda x, u, p: {"angle": x.rate, "rate": u.torque - p.stiffness * np.sin(x.angle)},
+        ...     outputs=lambda x, u, p: {"y": x.angle},
+        ...     measurement={"y": 0.01},
+        ... )
+        >>> pendulum.to_dict()["derivative"]["rate"]
+        '(torque - (stiffness * sin(angle)))'
+        """
+        if (derivative is None) == (next is None):
+            raise ValueError("derivative: give one of derivative and next")
+        channels = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
+        known = dict(parameters or {})
+
+        def space(names: Mapping[str, Any]) -> SimpleNamespace:
+            return SimpleNamespace(**{name: Expression(name) for name in names})
+
+        spaces = (space(states), space(channels), space(known))
+
+        def equations(what: str, function: Callable[..., Mapping[str, Any]], *more: Any) -> dict[str, str]:
+            found = function(*spaces, *more)
+            if not isinstance(found, Mapping):
+                raise TypeError(f"{what}: it returned {type(found).__name__}; return a dict of names and expressions")
+            return {str(name): _text_of(value) for name, value in found.items()}
+
+        model: dict[str, Any] = {"sample_time": sample_time}
+        if substeps is not None:
+            model["substeps"] = substeps
+        model["states"] = {
+            name: dict(value) if isinstance(value, Mapping) else dict(zip(("start", "sd"), value))
+            for name, value in states.items()
+        }
+        model["inputs"] = channels
+        model["parameters"] = known
+        if derivative is not None:
+            model["derivative"] = equations("derivative", derivative)
+        if next is not None:
+            model["next"] = equations("next", next, Expression("dt"))
+        model["outputs"] = equations("outputs", outputs)
+        model["noise"] = {"process": dict(process or {}), "measurement": dict(measurement)}
+        return cls(model)
+
+    @property
+    def sample_time(self) -> float:
+        """Seconds from one sample to the next."""
+        return self._model.sample_time
+
+    @property
+    def states(self) -> list[str]:
+        """The names of the states."""
+        return self._model.states
+
+    @property
+    def inputs(self) -> list[str]:
+        """The channels of the inputs."""
+        return self._model.inputs
+
+    @property
+    def outputs(self) -> list[str]:
+        """The channels of the outputs."""
+        return self._model.outputs
+
+    @property
+    def unknown(self) -> list[str]:
+        """The names of the parameters that are unknown."""
+        return self._model.unknown
+
+    def with_parameters(self, **values: float) -> GreyBox:
+        """The same model with values of unknown parameters, which are known then.
+
+        Raises
+        ------
+        ValueError
+            If there is no such unknown parameter, or a value is outside its bounds.
+        """
+        made = object.__new__(type(self))
+        made._model = self._model.with_parameters([(name, _number(name, value)) for name, value in values.items()])
+        return made
+
+    def to_toml(self) -> str:
+        """The text as it was written."""
+        return self._model.to_toml()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The entries of the text."""
+        try:
+            import tomllib
+        except ImportError:  # Python before 3.11
+            import tomli as tomllib  # type: ignore[import-not-found, no-redef]
+        return tomllib.loads(self.to_toml())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, GreyBox):
+            return NotImplemented
+        return (self.to_toml(), self._model.known) == (other.to_toml(), other._model.known)
+
+    def __hash__(self) -> int:
+        return hash(self.to_toml())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_restored, (self.to_toml(), self._model.known))
+
+    def __repr__(self) -> str:
+        parts = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs, "unknown": self.unknown}
+        return f"GreyBox({', '.join(f'{name} {chr(32).join(names)}' for name, names in parts.items() if names)})"
+
+
+def _restored(text: str, known: Sequence[tuple[str, float]]) -> GreyBox:
+    made = object.__new__(GreyBox)
+    made._model = _thetahat.GreyBox(text).with_parameters(known)
+    return made
+
+
+def _plain(name: str, value: Any) -> Any:
+    """Numbers of NumPy as those of Python, mappings as dicts."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(str(key), entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(name, entry) for entry in value]
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, float) and not np.isfinite(plain):
+        raise ValueError(f"{name}: {plain} is not a finite number")
+    if not isinstance(plain, (bool, int, float, str)):
+        raise TypeError(f"{name}: expected a number, a text or a dict, found {plain!r}")
+    return plain
+
+
+def _toml(model: Mapping[str, Any]) -> str:
+    """The text of a model, in which names stand in the order in which they were given."""
+    tables = {name: value for name, value in model.items() if isinstance(value, dict)}
+    lines = [f"{_key(name)} = {_inline(value)}" for name, value in model.items() if name not in tables]
+    for name, table in tables.items():
+        lines += ["", f"[{_key(name)}]", *(f"{_key(key)} = {_inline(value)}" for key, value in table.items())]
+    return "\n".join([*lines, ""])
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(key)} = {_inline(entry)}" for key, entry in value.items()) + " }" if value else "{}"
+    if isinstance(value, list):
+        return f"[{', '.join(_inline(entry) for entry in value)}]"
+    if isinstance(value, str):
+        # TOML has JSON's escapes, and wants DEL as one too.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return {True: "true", False: "false"}[value] if isinstance(value, bool) else repr(value)
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+
+
+Equations = Union[GreyBox, str, "os.PathLike[str]", Mapping[str, Any]]
+"""A model in equations, or what `GreyBox` makes one of."""
+
+
+def grey(
+    log: Log,
+    model: Equations,
+    *,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    step: float | tuple[float, float] | None = None,
+    starts: int | None = None,
+    seed: int | None = None,
+    time_limit: float | None = None,
+) -> Model:
+    """Find the unknown parameters of a model in equations: those of the largest likelihood, as ``thetahat fit --grey`` does.
+
+    Parameters
+    ----------
+    log : Log
+        The data, with the channels of the model by name. The clock may be uneven (``uniform=False``); joined logs are experiments that
+        each begin as the model says.
+    model : GreyBox, str, path or dict
+        The equations.
+    estimate, validate, split, search, max_iterations, tolerance, step, starts, seed, time_limit
+        What to fit to and how, see `thetahat.EquationsOptions`.
+
+    Returns
+    -------
+    Model
+        Its `Model.kind` is ``"equations"``.
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the parameters, which are named.
+    ValueError
+        If an argument does not make sense, a channel is not in the log, or the filter leaves the range of numbers.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> u = np.repeat([0.0, 1.0, 2.0, 1.0, 0.0], 20)
+    >>> y = np.zeros(100)
+    >>> for t in range(1, 100):
+    ...     y[t] = y[t - 1] + (u[t - 1] - 0.1 * y[t - 1]) / 2
+    >>> log = th.Log(y + 0.01 * np.random.default_rng(0).standard_normal(100), u, sample_time=1)
+    >>> tank = {
+    ...     "sample_time": 1,
+    ...     "states": {"level": {"start": 0, "sd": 0.1}},
+    ...     "inputs": {"flow": "u"},
+    ...     "parameters": {"area": {"start": 1, "sd": 1, "unknown": True, "min": 0}},
+    ...     "next": {"level": "level + dt * (flow - 0.1 * level) / area"},
+    ...     "outputs": {"y": "level"},
+    ...     "noise": {"measurement": {"y": 0.01}},
+    ... }
+    >>> model = th.grey(log, tank)
+    >>> model.parameters.round(2)
+    array([2.])
+    """
+    words = _options.words(EquationsOptions, locals(), len(log) if isinstance(log, Log) else None)
+    box = model if isinstance(model, GreyBox) else GreyBox(model)
+    found = Model._of(_thetahat.fit_equations(handle("log", log), box._model, words))
+    for warning in found.warnings:
+        _said.warn(warning, EstimationWarning, stacklevel=2)
+    return found

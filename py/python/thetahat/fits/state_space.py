@@ -1,0 +1,130 @@
+"""Models in state space, with any number of outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Union
+
+from thetahat import _thetahat
+from thetahat.base import said as _said
+from thetahat.base.said import EstimationWarning
+from thetahat.engine import options as _options
+from thetahat.engine.options import FitOptions, Orders, Rows
+from thetahat.logs.log import Log, handle
+from thetahat.models.model import Model
+
+
+def ss(
+    log: Log,
+    order: int | range | None = None,
+    *,
+    nk: Union[int, Sequence[int], None] = None,
+    weighting: str | None = None,
+    past: int | None = None,
+    future: int | None = None,
+    feedthrough: bool | None = None,
+    refine: str | None = None,
+    search: str | None = None,
+    max_iterations: int | None = None,
+    tolerance: float | None = None,
+    time_limit: float | None = None,
+    estimate: Rows | None = None,
+    validate: Rows | None = None,
+    split: tuple[float, float, float] | None = None,
+    detrend: str | None = None,
+    offset: Mapping[str, float] | None = None,
+    constant: str | None = None,
+) -> Model:
+    """Fit a state-space model, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), by a subspace method.
+
+    The states are found first, from a long vector ARX model (SSARX), then the matrices by least squares. It is consistent where a
+    controller feeds outputs back to the inputs.
+
+    Parameters
+    ----------
+    log : Log
+        The data, with any number of inputs and outputs. Without inputs it is a time series.
+    order : int or range, optional
+        How many states; or among how many to choose by MDL: ``range(1, 11)`` are 1 to 10. From 1 to 20 unless it is said.
+    nk : int, or one for each input, optional
+        Samples from input to first effect. Without it an input acts one sample later, or at once if ``feedthrough`` says so.
+    weighting : {"ssarx", "moesp", "n4sid", "cva"}, optional
+        Which subspace method. All but the first project on future inputs, and are biased where inputs are fed back.
+    past, future : int, optional
+        Past samples that the states are made of, those of the least AIC unless it is said, and future ones that they tell of: as many.
+    feedthrough : bool, optional
+        Whether inputs act on the outputs at once. Where it lowers MDL and the inputs are not fed back, unless it is said.
+    refine : {"prediction", "simulation"}, optional
+        Search from there for the model of the least errors one step ahead, or of the free run. Poles, gains and responses then have
+        standard errors.
+    search, max_iterations, tolerance, time_limit
+        How to search, see `thetahat.FitOptions`.
+    estimate, validate, split, detrend, offset, constant
+        What to fit to, see `thetahat.FitOptions`.
+
+    Returns
+    -------
+    Model
+        Its `Model.kind` is ``"state-space"``.
+
+    Raises
+    ------
+    EstimationError
+        If the data cannot determine the states: too few rows, a constant channel, outputs that depend on one another.
+    ValueError
+        If an argument does not make sense, or no row to fit to has a value in every channel.
+
+    Warns
+    -----
+    EstimationWarning
+        For what a careful reader of the model should know.
+
+    References
+    ----------
+    Jansson, Subspace identification and ARX modeling, IFAC SYSID 2003. Chiuso, Automatica 43, 2007.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thetahat as th
+    >>> rng = np.random.default_rng(0)
+    >>> u, x = rng.normal(size=(1000, 2)), np.zeros(1001)
+    >>> for k in range(1000):
+    ...     x[k + 1] = 0.8 * x[k] + u[k, 0] - 0.5 * u[k, 1]
+    >>> y = np.column_stack([x[:-1], 2 * x[:-1]]) + 0.1 * rng.normal(size=(1000, 2))
+    >>> model = th.ss(th.Log(y, u, sample_time=1))
+    >>> model.name, model.poles().real.round(2).tolist()
+    ('state space of order 1', [0.8])
+    >>> [round(model.dc_gain("u2", output="y2")[0], 1), model.to_state_space().H.shape]
+    [-5.0, (2, 1)]
+    >>> refined = th.ss(th.Log(y, u, sample_time=1), 1, refine="prediction")
+    >>> value, error = refined.dc_gain("u2", output="y2")
+    >>> abs(value + 5) < 3 * error
+    True
+    """
+    words = subspace_words(order, nk, weighting, past, future, feedthrough)
+    words += [] if refine is None else [f"--refine={_options.text('refine', refine)}"]
+    words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
+    found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
+    for warning in found._model.warnings():
+        _said.warn(warning, EstimationWarning, stacklevel=2)
+    return found
+
+
+def subspace_words(
+    order: int | range | str | None,
+    nk: Orders | None,
+    weighting: str | None,
+    past: int | None,
+    future: int | None,
+    feedthrough: bool | None,
+) -> list[str]:
+    """How the states are found, as options; the order "auto" is left to the data, as none is."""
+    if isinstance(order, str) and order != "auto":
+        raise TypeError(f'order: expected an int, a range or "auto", found {order!r}')
+    words = ["--model=ss", *_options.order_words(order=None if isinstance(order, str) else order, nk=nk)]
+    words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
+    words += [] if past is None else [f"--past={_options.count('past', past)}"]
+    words += [] if future is None else [f"--future={_options.count('future', future)}"]
+    words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
+    return words

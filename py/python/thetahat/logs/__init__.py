@@ -1,0 +1,1 @@
+"""Logs: the measured signals, how they are read, and what they are worth before any fit."""

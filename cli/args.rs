@@ -12,6 +12,7 @@ mod fit;
 mod inspect;
 mod lines;
 mod log;
+mod options;
 mod reduce;
 mod respond;
 mod spectrum;
@@ -31,14 +32,11 @@ pub(crate) use design::DesignArguments;
 pub(crate) use each::EachArguments;
 pub(crate) use export::ExportArguments;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
-pub(crate) use fit::{
-    ConstantArgument, CriterionArguments, FeedthroughArgument, FitArguments, InitialArgument, KernelArgument,
-    LikelihoodArgument, MapArgument, MembershipArgument, MethodArgument, ModelArgument, ModelArguments,
-    NarxArguments, PathArgument, SearchArgument, SearchArguments,
-};
+pub(crate) use fit::FitArguments;
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};
 pub(crate) use log::{ClockArguments, LiveClockArguments, LogArguments, Names};
+pub(crate) use options::FitOptionArguments;
 pub(crate) use reduce::ReduceArguments;
 pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
@@ -374,6 +372,8 @@ pub(crate) enum DocumentArgument {
     Filter,
     /// What design writes for a model
     Design,
+    /// The options of a fit, as --plan reads them
+    Plan,
     /// What normal equations are written as, in Python and in the crate
     NormalEquations,
 }

@@ -10,26 +10,17 @@ use thetahat::data::{Log, Source};
 use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::{Inspection, TopicList};
 use thetahat::model::Model;
-use thetahat::report::{
-    EquationsPlan, NonlinearArxPlan, Plan, ProcessPlan, Report, Requirement, StateSpacePlan, ValidationPlan,
-};
+use thetahat::report::{Report, Requirement, ValidationPlan};
 use thetahat::spectrum::SpectrumPlan;
 use thetahat::step_test::StepTestPlan;
 use thetahat::tune::Tuning;
 
-use crate::args::{
-    ControlArguments, DesignArguments, FitArguments, InspectArguments, MapArgument, TuneArguments,
-    ValidateArguments,
-};
+use crate::args::{ControlArguments, DesignArguments, InspectArguments, TuneArguments, ValidateArguments};
 use crate::commands::{
-    Channels, Experiments, Making, PiecesJob, Tracking, compared_signals, designed, experiments, inspected,
-    settings,
+    Experiments, Tracking, compared_signals, designed, experiments, inspected, plan, settings,
 };
 use crate::failure::Failure;
-use crate::job::{
-    DesignJob, EvaluationJob, FitJob, GreyBoxJob, InspectJob, NarxJob, ProcessJob, SpectrumJob,
-    StateSpaceJob, StepTestJob, control_plan,
-};
+use crate::job::{DesignJob, EvaluationJob, FitJob, InspectJob, SpectrumJob, StepTestJob, control_plan};
 use crate::log;
 use crate::replace::replace;
 
@@ -54,114 +45,10 @@ pub struct Opened {
 /// # Errors
 /// A [`Failure`] as the program would report it.
 pub fn read(options: &[OsString], uniform: bool) -> Result<Opened, Failure> {
-    let mut job = FitJob::resolve(&arguments("fit", options)?)?;
+    let mut job = FitJob::resolve(&arguments("fit", options)?, plan)?;
     job.log.quiet = true;
-    let Experiments { log, sources, channels, words } = experiments(&job, !uniform)?;
-    Ok(Opened { log, sources, inputs: channels.inputs, outputs: channels.outputs, warnings: words })
-}
-
-/// The plan that `thetahat fit` makes of these options for a log with these channels. Orders without inputs leave those
-/// of the log out.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn plan(options: &[OsString], inputs: Vec<String>, output: String) -> Result<Plan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let job = FitJob::resolve(&arguments("fit", &words)?)?;
-    let inputs = if job.orders.has_inputs() { inputs } else { Vec::new() };
-    if inputs.is_empty() && job.orders.has_inputs() && job.orders.is_given() {
-        return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
-    }
-    job.plan(inputs, output)
-}
-
-/// What `thetahat fit --stream` makes of a part of a log with these channels, with these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn pieces(options: &[OsString], inputs: Vec<String>, outputs: Vec<String>) -> Result<Making, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let job = PiecesJob::resolve(&arguments("fit", &words)?, outputs.len() > 1)?;
-    let inputs = if job.is_driven() { inputs } else { Vec::new() };
-    if inputs.is_empty() && job.needs_inputs() {
-        return Err(Failure::usage("--nb: the log has no inputs; give it some, or orders of a time series"));
-    }
-    job.making(Channels { inputs, outputs }).map(|(_, making)| making)
-}
-
-/// The plan that `thetahat fit --grey` makes of these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn equations_plan(options: &[OsString]) -> Result<EquationsPlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    Ok(GreyBoxJob::resolve(&arguments("fit", &words)?, Path::new("model"))?.plan)
-}
-
-/// The plan that `thetahat fit --narx` makes of these options for a log with these channels.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn narx_plan(
-    options: &[OsString],
-    inputs: Vec<String>,
-    outputs: Vec<String>,
-) -> Result<NonlinearArxPlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let arguments: FitArguments = arguments("fit", &words)?;
-    let map = arguments.narx.narx.ok_or_else(|| {
-        Failure::usage(format!("--narx: name the functions, one of {}", MapArgument::words()))
-    })?;
-    let job = NarxJob::resolve(&arguments, map)?;
-    job.plan(if job.driven { inputs } else { Vec::new() }, outputs)
-}
-
-/// The plan that `thetahat fit --model ss`, or with several outputs `--model arx`, makes of these options for a log
-/// with these channels.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn state_space_plan(
-    options: &[OsString],
-    inputs: Vec<String>,
-    outputs: Vec<String>,
-) -> Result<StateSpacePlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let job = StateSpaceJob::resolve(&arguments("fit", &words)?, outputs.len() > 1)?;
-    let job = job.ok_or_else(|| Failure::usage("--model: give ss"))?;
-    job.plan(inputs, outputs)
-}
-
-/// The plan that `thetahat fit --structure` makes of these options for a log with these channels.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn process_plan(
-    options: &[OsString],
-    inputs: Vec<String>,
-    output: String,
-) -> Result<ProcessPlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    let job = ProcessJob::resolve(&arguments("fit", &words)?)?;
-    let job = job.ok_or_else(|| Failure::usage("--structure: name one, such as p1d"))?;
-    job.plan(inputs, output)
-}
-
-/// The plan that `thetahat fit --from` makes of these options, for all inputs of a response.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn response_plan(options: &[OsString]) -> Result<ProcessPlan, Failure> {
-    let from = OsString::from("--from=response");
-    let words: Vec<OsString> = options.iter().cloned().chain([from]).collect();
-    let job = ProcessJob::resolve(&arguments("fit", &words)?)?;
-    job.map(|job| job.plan_of_response()).ok_or_else(|| Failure::usage("--structure: name one, such as p1d"))
+    let Experiments { log, sources, channels, warnings } = experiments(&job, !uniform)?;
+    Ok(Opened { log, sources, inputs: channels.inputs, outputs: channels.outputs, warnings })
 }
 
 /// How `thetahat validate` evaluates a model with these options, and what it requires.
@@ -296,9 +183,9 @@ pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
 }
 
 /// The arguments of a verb.
-fn arguments<T: Args>(verb: &'static str, words: &[OsString]) -> Result<T, Failure> {
+fn arguments<T: Args>(verb: &'static str, warnings: &[OsString]) -> Result<T, Failure> {
     let command = clap::Command::new(verb).no_binary_name(true).disable_help_flag(true);
-    let parsed = T::augment_args(command).try_get_matches_from(words);
+    let parsed = T::augment_args(command).try_get_matches_from(warnings);
     parsed.and_then(|matches| T::from_arg_matches(&matches)).map_err(|error| {
         use clap::error::{ContextKind, ContextValue};
         let context = |kind| error.get(kind);

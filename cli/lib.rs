@@ -42,12 +42,11 @@ use messages::{say, tell};
 use thetahat::text;
 
 pub use binding::{
-    Opened, compare_signals, controller_of, equations_plan, inspect, narx_plan, pieces, plan, process_plan,
-    read, response_plan, signal_plan, spectrum_plan, state_space_plan, step_test_plan, topic_list, track,
-    tuning_of, validation_plan, write,
+    Opened, compare_signals, controller_of, inspect, read, signal_plan, spectrum_plan, step_test_plan,
+    topic_list, track, tuning_of, validation_plan, write,
 };
 pub use commands::demo::LOG as DEMO_LOG;
-pub use commands::{Journal, Making, TrackedRow, Tracking, consistency};
+pub use commands::{Journal, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};
 pub use options::with_options;
 

@@ -25,7 +25,7 @@ pub(crate) struct Loaded {
     pub(crate) log: Log,
     pub(crate) source: Source,
     /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Which clocks what is done with a log can go by.
@@ -55,7 +55,7 @@ pub(crate) struct Joined {
     pub(crate) log: Log,
     pub(crate) sources: Vec<Source>,
     /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Reads the columns of some logs that `choose` names of each, seeing those there are, one log after the other.
@@ -65,18 +65,19 @@ pub(crate) fn joined(
     clocks: Clocks,
     mut choose: impl FnMut(&Path, &[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Joined, Failure> {
-    let (mut logs, mut sources, mut words) = (Vec::new(), Vec::<Source>::new(), Vec::new());
+    let (mut logs, mut sources, mut warnings) = (Vec::new(), Vec::<Source>::new(), Vec::new());
     for path in paths {
-        let Loaded { log, mut source, words: own } = load(path, job, clocks, |header| choose(path, header))?;
+        let Loaded { log, mut source, warnings: own } =
+            load(path, job, clocks, |header| choose(path, header))?;
         let before = sources.last().map_or(0, |source| source.rows.last());
         source.rows = Rows::new(before + 1, before + log.rows())
             .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
         logs.push(log);
-        words.extend(own);
+        warnings.extend(own);
         sources.push(source);
     }
     let log = Log::join(logs).map_err(failure(&sources))?;
-    Ok(Joined { log, sources, words })
+    Ok(Joined { log, sources, warnings })
 }
 
 /// What the library says of some logs, with the file that has the row or, without a row, all of them.
@@ -109,7 +110,7 @@ pub(crate) fn load(
     clocks: Clocks,
     choose: impl FnOnce(&[String]) -> Result<Vec<String>, Failure>,
 ) -> Result<Loaded, Failure> {
-    let Columns { channels, table, mut source, clock, restarts, mut words } =
+    let Columns { channels, table, mut source, clock, restarts, mut warnings } =
         columns(open(path, job)?, path, job, false, |reader| choose(reader.names()))?;
     let file = source.file.clone();
     let rows = table.rows;
@@ -131,7 +132,7 @@ pub(crate) fn load(
     };
     let each: Vec<(Log, Option<Resample>)> = each.map_err(at_line(&file, &table.lines))?;
     if let Some(Resample { step, interpolation, .. }) = each.iter().find_map(|(_, how)| *how) {
-        words.push(format!(
+        warnings.push(format!(
             "{file}: the log has two rates, and what it is used for needs one: it is resampled every {step} s, channels that move in steps \
              by hold, the others by straight lines; --resample says otherwise"
         ));
@@ -140,7 +141,7 @@ pub(crate) fn load(
     let logs = each.into_iter().map(|(log, _)| log).collect();
     let log = Log::join(logs).map_err(at_line(&file, &table.lines))?;
     source.rows = Rows::new(1, log.rows()).map_err(at_line(&file, &table.lines))?;
-    Ok(Loaded { log, source, words })
+    Ok(Loaded { log, source, warnings })
 }
 
 /// The parts of a log that begin at these rows, and the one before.
@@ -235,16 +236,16 @@ pub(crate) fn in_parts<T>(
     let file = path.display().to_string();
     let (names, lags, chosen) =
         choose(&reader).map_err(|failure| topics::explained(failure, &reader, path))?;
-    let Selected { selection, clock, note, mut words } = selected(&reader, &file, job, &names)?;
+    let Selected { selection, clock, note, mut warnings } = selected(&reader, &file, job, &names)?;
     let most = (PART / (names.len() + 1)).max(2 * lags);
     let mut before = Before { file: &file, names: &names, clock, lags, rows: 0, tail: Tail::default() };
     let mut waiting: Option<Table> = None;
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
     let mut taken = |mut part: Table| -> Result<(), Failure> {
-        for word in std::mem::take(&mut part.words) {
-            if !words.contains(&word) {
-                words.push(word);
+        for warning in std::mem::take(&mut part.words) {
+            if !warnings.contains(&warning) {
+                warnings.push(warning);
             }
         }
         match &mut waiting {
@@ -272,7 +273,7 @@ pub(crate) fn in_parts<T>(
         take(&chosen, before.with(last)?)?;
     }
     note.iter().for_each(|note| messages::note(note));
-    Ok(words)
+    Ok(warnings)
 }
 
 /// Columns, and their times where there is a clock.
@@ -345,7 +346,7 @@ pub(crate) struct Recorded {
     /// The line on which each row is.
     pub(crate) lines: Lines,
     /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// Reads the columns of a log that `choose` names as they are, one row a second without a clock.
@@ -355,11 +356,11 @@ pub(crate) fn record(
     job: &LogJob,
     choose: impl FnOnce(&Reader) -> Result<Vec<String>, Failure>,
 ) -> Result<Recorded, Failure> {
-    let Columns { channels, table, source, clock, restarts, words } =
+    let Columns { channels, table, source, clock, restarts, warnings } =
         columns(reader, path, job, true, choose)?;
     let time = table.time.map(|time| after_pauses(time, &restarts));
     let times = times(&clock, time);
-    Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, words })
+    Ok(Recorded { recording: Recording { channels, times }, source, lines: table.lines, warnings })
 }
 
 /// The times of experiments, each after a pause that is a gap to whoever looks at the clock.
@@ -405,13 +406,13 @@ pub(crate) fn follow(
         }
         _ => job,
     };
-    let Selected { selection, mut words, .. } = selected(&reader, &file, live, &names)?;
-    words.extend(
+    let Selected { selection, mut warnings, .. } = selected(&reader, &file, live, &names)?;
+    warnings.extend(
         hint.map(|name| format!("{file}: column '{name}' looks like a clock; --time {name} would use it")),
     );
     let stream = reader.stream(&selection, whole_lines, start)?;
     interrupt::follows(stream.waker());
-    Ok((stream, words))
+    Ok((stream, warnings))
 }
 
 /// What the library says of the rows of one log, with the line.
@@ -435,7 +436,7 @@ struct Columns {
     /// The rows (from 0) at which the clock begins again.
     restarts: Vec<usize>,
     /// What the reader should know, in plain words.
-    words: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// Opens a log, and reads as far as its first row.
@@ -454,13 +455,13 @@ fn columns(
 ) -> Result<Columns, Failure> {
     let file = path.display().to_string();
     let names = choose(&reader).map_err(|failure| topics::explained(failure, &reader, path))?;
-    let Selected { selection, mut clock, mut note, mut words } = selected(&reader, &file, job, &names)?;
+    let Selected { selection, mut clock, mut note, mut warnings } = selected(&reader, &file, job, &names)?;
 
     let progress = (!job.quiet).then(Reading::new);
     let mut update = |read, total| progress.iter().for_each(|progress| progress.update(read, total));
     let mut table = reader.read(&selection, &mut update)?;
     drop(progress);
-    words.append(&mut table.words);
+    warnings.append(&mut table.words);
     let mut resampled = None;
     if !table.clocks.is_empty() {
         let (how, said) = topics::on_one_clock(&file, &names, &mut table, clock.resample())?;
@@ -476,7 +477,7 @@ fn columns(
         let kept = any_order.then(|| time.clone());
         match (mended(time, calendar(table.calendar)), kept) {
             (Ok(mended), _) => {
-                words.extend(mended.words.iter().map(|words| format!("{file}: {words}")));
+                warnings.extend(mended.words.iter().map(|warning| format!("{file}: {warning}")));
                 (table.time, restarts) = (Some(mended.time), mended.restarts);
             }
             (Err(_), Some(time)) => table.time = Some(time),
@@ -490,7 +491,7 @@ fn columns(
     let channels = names.into_iter().zip(values).map(|(name, values)| Channel { name, values }).collect();
     let rows = Rows::new(1, table.rows).map_err(|error| Failure::data(format!("{file}: {error}")))?;
     let source = Source { file, rows, time: clock.column(), start: table.start.take(), resampled };
-    Ok(Columns { channels, table, source, clock, restarts, words })
+    Ok(Columns { channels, table, source, clock, restarts, warnings })
 }
 
 /// What the times of a table are, to the library.
@@ -516,7 +517,7 @@ struct Selected {
     /// Which clock was taken, if none was named.
     note: Option<String>,
     /// What the reader should know, in plain words.
-    words: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// Where the named columns are, and the clock: that of the job, or the one column of the log that is a clock and not
@@ -526,7 +527,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
     let header = reader.names();
     let columns = find_all(names, header).map_err(bad);
     let columns = columns.map_err(|failure| topics::explained(failure, reader, Path::new(file)))?;
-    let (mut taken, mut words) = (None, Vec::new());
+    let (mut taken, mut warnings) = (None, Vec::new());
     let (clock, found) = match &job.clock {
         _ if reader.topics().is_some() => {
             let topics = reader.topics().unwrap_or_default();
@@ -554,7 +555,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
                 }
                 (None, None) => {
                     let meant = reader.called_clocks().into_iter().find(|column| !columns.contains(column));
-                    words.extend(meant.map(|column| {
+                    warnings.extend(meant.map(|column| {
                         let name = &header[column];
                         format!(
                             "{file}: column '{name}' is called as a clock is, or holds dates, but its times do not rise or are not \
@@ -585,7 +586,7 @@ fn selected(reader: &Reader, file: &str, job: &LogJob, names: &[String]) -> Resu
         selection: Selection { columns, time, date },
         clock,
         note: taken.filter(|_| !job.quiet),
-        words,
+        warnings,
     })
 }
 

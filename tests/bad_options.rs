@@ -19,13 +19,13 @@ fn refused(lines: &[(&str, &[&str])]) {
 #[test]
 fn orders_that_a_model_needs() {
     refused(&[
-        ("--nb 2", &["--model arx needs --na"]),
-        ("--na 2", &["--model arx needs --nb"]),
-        ("--model armax --na 2 --nb 2", &["--model armax needs --nc"]),
-        ("--model arma --nc 1", &["--model arma needs --na"]),
-        ("--model oe --nb 2", &["--model oe needs --nf"]),
-        ("--model bj --nb 2 --nf 2", &["--model bj needs --nc, --nd"]),
-        ("--model general", &["--model general needs orders", "--na --nb --nc --nd --nf"]),
+        ("--nb 2", &["--model: arx needs --na"]),
+        ("--na 2", &["--model: arx needs --nb"]),
+        ("--model armax --na 2 --nb 2", &["--model: armax needs --nc"]),
+        ("--model arma --nc 1", &["--model: arma needs --na"]),
+        ("--model oe --nb 2", &["--model: oe needs --nf"]),
+        ("--model bj --nb 2 --nf 2", &["--model: bj needs --nc, --nd"]),
+        ("--model general", &["--model: general needs orders", "--na, --nb, --nc, --nd, --nf"]),
         ("--model general --na 0", &["no parameters"]),
     ]);
 }
@@ -33,13 +33,13 @@ fn orders_that_a_model_needs() {
 #[test]
 fn orders_that_a_model_does_not_take() {
     refused(&[
-        ("--na 2 --nb 2 --nc 1", &["--model arx does not take --nc"]),
-        ("--model armax --na 2 --nb 2 --nc 1 --nf 1", &["--model armax does not take --nf"]),
-        ("--model oe --na 2 --nb 2 --nf 2", &["--model oe does not take --na", "--nb --nf"]),
-        ("--model bj --na 1 --nb 2 --nc 1 --nd 1 --nf 2", &["--model bj does not take --na"]),
-        ("--model arma --na 2 --nc 1 --nb 2", &["--model arma does not take --nb"]),
-        ("--model ar --na 2 --nk 2", &["--model ar does not take --nk", "no inputs"]),
-        ("--model ar --na 2 --nc 1", &["--model ar does not take --nc"]),
+        ("--na 2 --nb 2 --nc 1", &["--model: arx does not take --nc"]),
+        ("--model armax --na 2 --nb 2 --nc 1 --nf 1", &["--model: armax does not take --nf"]),
+        ("--model oe --na 2 --nb 2 --nf 2", &["--model: oe does not take --na", "--nb, --nf"]),
+        ("--model bj --na 1 --nb 2 --nc 1 --nd 1 --nf 2", &["--model: bj does not take --na"]),
+        ("--model arma --na 2 --nc 1 --nb 2", &["--model: arma does not take --nb"]),
+        ("--model ar --na 2 --nk 2", &["--model: ar does not take --nk", "no inputs"]),
+        ("--model ar --na 2 --nc 1", &["--model: ar does not take --nc"]),
     ]);
 }
 
@@ -56,14 +56,14 @@ fn inputs_of_a_model_without_any() {
 #[test]
 fn orders_for_another_number_of_inputs() {
     refused(&[
-        ("--model oe -u a,b --nb 2 --nf 2,1,1", &["--nf has 3 values for 2 inputs"]),
-        ("--model oe -u a --nb 2,1 --nf 2", &["--nb has 2 values for 1 input;"]),
+        ("--model oe -u a,b --nb 2 --nf 2,1,1", &["--nf: 3 values for 2 inputs"]),
+        ("--model oe -u a --nb 2,1 --nf 2", &["--nb: 2 values for 1 input;"]),
         ("--model oe -u a,b --nb 2,0 --nf 1,2", &["--nf: input 2 has F without B"]),
         ("--model oe -u a --nb 1001 --nf 2", &["1000"]),
     ]);
     let folder = Folder::with_log(plain_log());
     let line = folder.refused("fit log.csv --model oe --nb 2 --nf 2,2", 2);
-    assert!(line.contains("--nf has 2 values for 1 input"), "{line}");
+    assert!(line.contains("--nf: 2 values for 1 input"), "{line}");
 }
 
 #[test]
@@ -89,17 +89,17 @@ fn search_options_that_make_no_sense() {
     for (options, parts) in [
         ("--step 1", &["--step", "--search gradient"][..]),
         ("--search newton --step 1", &["--step", "--search gradient"]),
-        ("--search gradient --step 0", &["--step 0", "C1,C2"]),
-        ("--search gradient --step 1,-2", &["--step 1,-2", "C1,C2"]),
-        ("--search gradient --step 1,2,3", &["--step 1,2,3", "C1,C2"]),
-        ("--search gradient --step inf", &["--step inf", "C1,C2"]),
-        ("--tolerance 0", &["--tolerance 0", "positive"]),
+        ("--search gradient --step 0", &["--step: '0'", "C1,C2"]),
+        ("--search gradient --step 1,-2", &["--step: '1,-2'", "C1,C2"]),
+        ("--search gradient --step 1,2,3", &["--step: '1,2,3'", "C1,C2"]),
+        ("--search gradient --step inf", &["--step: 'inf'", "C1,C2"]),
+        ("--tolerance 0", &["--tolerance: 0", "positive"]),
         ("--tolerance -1e-9", &["--tolerance", "positive"]),
-        ("--tolerance nan", &["--tolerance NaN", "positive"]),
-        ("--time-limit 0", &["--time-limit 0", "positive"]),
-        ("--time-limit -3", &["--time-limit -3", "positive"]),
-        ("--time-limit 1e300", &["--time-limit 1e300", "too long"]),
-        ("--initial drop", &["--initial drop", "without F"]),
+        ("--tolerance nan", &["--tolerance: 'nan'", "finite"]),
+        ("--time-limit 0", &["--time-limit: 0", "positive"]),
+        ("--time-limit -3", &["--time-limit: -3", "positive"]),
+        ("--time-limit 1e300", &["--time-limit: 1e300", "too long"]),
+        ("--initial drop", &["--initial: drop", "without F"]),
     ] {
         refused(&[(&format!("{oe} {options}"), parts)]);
     }

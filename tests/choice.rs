@@ -286,7 +286,7 @@ fn options_that_do_not_go_with_a_choice_are_refused() {
         ("--na 1..2 --nb 2 --split 60/40", "three shares"),
         ("--na 1..2 --nb 2 --split 0/50/50", "shares"),
         ("--na 1..2 --nb 2 --split 60/20/20 --validate 1..10", "--validate"),
-        ("-u a,b --na 1..2 --nb 1..2,1..2,1..2", "--nb has 3 values for 2 inputs"),
+        ("-u a,b --na 1..2 --nb 1..2,1..2,1..2", "--nb: 3 values for 2 inputs"),
     ] {
         let run = folder.run(&format!("fit nowhere.csv {line}"));
         assert_eq!(run.code, 2, "{line}: {}", run.stderr);

@@ -86,7 +86,7 @@ fn a_column_of_times_is_the_clock() {
     let run = folder.done("fit polars.parquet --na 1 --nb 1 --format json");
     assert!(run.stderr.contains("note: polars.parquet: the clock is column 'when'"), "{}", run.stderr);
     let report: Value = serde_json::from_str(&run.stdout).unwrap();
-    assert_eq!(report, folder.fit("polars.parquet --time when --na 1 --nb 1"));
+    assert_eq!(report, folder.planned("polars.parquet --time when --na 1 --nb 1"));
     let said = folder.done("track polars.arrows --na 1 --nb 1").stderr;
     assert!(
         said.contains("polars.arrows: column 'when' looks like a clock; --time when would use it"),

@@ -92,7 +92,7 @@ fn a_slope_is_found_and_told() {
 fn what_does_not_go_together_is_refused() {
     let folder = steps(0.0);
     let line = folder.refused(&format!("fit {OE} --trend --constant no"), 2);
-    assert!(line.contains("--trend is a line with a level"), "{line}");
+    assert!(line.contains("--trend: it is a line with a level"), "{line}");
     let arx = "fit log.csv --sample-time 2 --na 1 --nb 1 --constant yes";
     let line = folder.refused(&format!("{arx} --initial zero"), 2);
     assert!(line.contains("--constant: zeros before the first sample"), "{line}");

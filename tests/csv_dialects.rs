@@ -184,7 +184,7 @@ fn standard_input() {
     let run = folder.run_on(&format!("fit - {FIT} --format json"), plain_log());
     assert_eq!(run.code, 0, "{}", run.stderr);
     let report: Value = serde_json::from_str(&run.stdout).unwrap();
-    assert_eq!(without_name(report), without_name(folder.fit(&format!("log.csv {FIT}"))));
+    assert_eq!(without_name(report), without_name(folder.planned(&format!("log.csv {FIT}"))));
 }
 
 #[test]

@@ -218,7 +218,7 @@ fn further_starts_find_a_lower_optimum() {
         ("--step 1", "--search gradient"),
         ("--starts 20000", "starts"),
         ("--tolerance 0", "tolerance"),
-        ("--select mdl", "cannot be used"),
+        ("--select mdl", "does not work with --grey"),
     ] {
         let run = folder.run(&format!("fit --grey model.toml log.csv --time t {option}"));
         assert!(run.code == 2 && run.stderr.contains(words), "{}", run.stderr);

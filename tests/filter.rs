@@ -487,7 +487,7 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
     assert!(folder.refused("filter model.toml log.csv --estimator kalman", 2).contains("--estimator"));
     assert!(folder.refused("filter - -", 2).contains("only one"));
     let run = folder.run("fit --grey model.toml log.csv --na 2");
-    assert!(run.code == 2 && run.stderr.contains("'--grey <MODEL>' cannot be used with"), "{}", run.stderr);
+    assert!(run.code == 2 && run.stderr.contains("--na: does not work with --grey"), "{}", run.stderr);
     assert!(folder.refused("filter model.toml log.csv -o model.toml", 2).contains("would be replaced"));
 
     folder.write("other.csv", "a,b\n1,2\n");

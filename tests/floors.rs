@@ -54,9 +54,9 @@ const LIBRARY: House = House {
         &["validate"],
         &["select"],
         &["inspect", "spectrum"],
-        &["control", "design", "step_test", "tune"],
+        &["control", "design", "plan", "step_test", "tune"],
         &["report"],
-        &["filter", "track"],
+        &["filter", "fit", "track"],
         &["export", "present"],
     ],
 };
@@ -101,7 +101,7 @@ const PYTHON: House = House {
     floors: &[
         &["error", "in_use"],
         &["journal", "work"],
-        &["array"],
+        &["array", "plan"],
         &["grey_box", "log"],
         &["model"],
         &["online"],

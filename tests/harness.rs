@@ -96,8 +96,15 @@ impl Folder {
         run
     }
 
-    /// Runs `thetahat fit` and gives its report.
+    /// Runs `thetahat fit` and gives its report without its plan, which may say the same in other words: what was found.
     pub(crate) fn fit(&self, line: &str) -> Value {
+        let mut report = self.planned(line);
+        report.as_object_mut().and_then(|report| report.remove("plan")).expect("a plan");
+        report
+    }
+
+    /// Runs `thetahat fit` and gives its report.
+    pub(crate) fn planned(&self, line: &str) -> Value {
         let run = self.done(&format!("fit {line} --format json"));
         serde_json::from_str(&run.stdout).expect("the report is JSON")
     }

@@ -82,11 +82,11 @@ fn what_it_does_not_go_with_is_refused_in_a_sentence() {
         ("--model general --na 1 --nb 1 --nd 1", "for ar, arma, arx and armax"),
         ("--model arma --na 1..2 --nc 1", "for one model"),
         ("", "for one model"),
-        ("--model arma --na 1 --nc 1 --norm huber", "--norm does not go with"),
-        ("--na 1 --nb 1 --ridge 1", "--ridge does not go with"),
-        ("--na 1 --nb 1 --method iv", "--method does not go with"),
-        ("--na 1 --nb 1 --prefilter ..0.1", "--prefilter does not go with"),
-        ("--model arma --na 1 --nc 1 --initial drop", "--initial drop leaves samples out"),
+        ("--model arma --na 1 --nc 1 --norm huber", "--norm: does not go with"),
+        ("--na 1 --nb 1 --ridge 1", "--ridge: does not go with"),
+        ("--na 1 --nb 1 --method iv", "--method: does not go with"),
+        ("--na 1 --nb 1 --prefilter ..0.1", "--prefilter: does not go with"),
+        ("--model arma --na 1 --nc 1 --initial drop", "--initial: drop leaves samples out"),
         ("--model arma --na 1 --nc 1 --initial estimate", "this model has none"),
     ] {
         let refusal = folder.refused(&format!("fit log.csv {options} --likelihood exact"), 2);

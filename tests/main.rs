@@ -46,6 +46,7 @@ mod nonlinear_arx;
 mod nonlinear_reference;
 mod output_files;
 mod pages;
+mod plan;
 mod predict_simulate;
 mod prediction_error;
 mod prefilter;

@@ -222,18 +222,18 @@ fn requirements_may_be_of_one_output() {
 fn what_other_models_have_is_refused() {
     let folder = motor();
     for (options, word) in [
-        ("--model ss --na 2", "--na is not for models in state space"),
+        ("--model ss --na 2", "--na: does not work with --model ss"),
         ("--model ss --method iv", "--method"),
         ("--model ss --search newton", "--search"),
         ("--model ss --ridge 1", "--ridge"),
-        ("--model ss --order 0", "--order 0"),
-        ("--model ss --order 5..2", "--order 5..2"),
-        ("--model ss --nk x", "--nk x"),
+        ("--model ss --order 0", "--order: "),
+        ("--model ss --order 5..2", "--order: 5..2"),
+        ("--model ss --nk x", "--nk: 'x'"),
         ("--model ss --weighting pem", "--weighting"),
         ("--weighting cva", "--model ss"),
-        ("--model ss --nk 0 --feedthrough no", "--nk 0"),
-        ("--model ss --nk 1,2", "--nk has 2 numbers for 1 inputs"),
-        ("--model arx --order 2", "--model ss"),
+        ("--model ss --nk 0 --feedthrough no", "--nk: 0"),
+        ("--model ss --nk 1,2", "--nk: 2 numbers for 1 inputs"),
+        ("--model arx --order 2", "--order: does not work with --model arx"),
         ("--past 4", "--model ss"),
     ] {
         let refusal = folder.run(&format!("fit log.csv --time t -u u -y speed {options}"));
@@ -370,8 +370,8 @@ fn refined_models_have_standard_errors_everywhere() {
     assert!(series.code == 2 && series.stderr.contains("without inputs there is no free run"), "{series:?}");
     for (options, word) in [
         ("--refine both", "--refine"),
-        ("--search newton", "--refine is needed with --search"),
-        ("--refine prediction --starts 3", "--starts is not for models in state space"),
+        ("--search newton", "--search: it is for a search; give --refine too"),
+        ("--refine prediction --starts 3", "--starts: does not work with several outputs"),
         ("--refine prediction --tolerance 0", "--tolerance"),
     ] {
         let refusal = folder.run(&format!("fit {MOTOR} {options}"));
@@ -464,8 +464,8 @@ fn an_arx_model_has_several_outputs() {
     let first = |report: &Value| number(report, "/estimation/b/0/0/0/value");
     assert!((first(&again) - first(&chosen)).abs() < 1e-3 * first(&chosen).abs());
     for (options, word) in [
-        ("--na 2 --nb 2 --nk 1..900", "--nk 1..900"),
-        ("--na 2 --nb 2 --nk 3..1", "--nk 3..1"),
+        ("--na 2 --nb 2 --nk 1..900", "--nk: 1..900"),
+        ("--na 2 --nb 2 --nk 3..1", "--nk: '3..1'"),
         ("--model ss --nk 1..2", "a range is for all inputs of an ARX model"),
     ] {
         let refusal = folder.refused(&format!("fit {MOTOR} {options}"), 2);
@@ -474,18 +474,21 @@ fn an_arx_model_has_several_outputs() {
     assert_eq!(waits["model"]["delays"], serde_json::json!([2]));
     for (options, word) in [
         ("--couple some --na 1", "--couple"),
-        ("--na 2 --nb 1,2", "--nb has 2 numbers for 1 inputs"),
-        ("--na 999", "--na 999"),
+        ("--na 2 --nb 1,2", "--nb: 2 numbers for 1 inputs"),
+        ("--na 999", "--na: 999"),
         ("--na 0 --nb 1..2,1", "--nb"),
-        ("--na 2 --order 3", "--order is for --model ss"),
-        ("--na 2 --refine prediction", "--refine is for --model ss"),
-        ("--na 2 --ridge 1", "--ridge is not for"),
+        ("--na 2 --order 3", "--order: does not work with several outputs"),
+        ("--na 2 --refine prediction", "--refine: does not work with several outputs"),
+        ("--na 2 --ridge 1", "--ridge: does not work with several outputs"),
     ] {
         let refusal = folder.run(&format!("fit {MOTOR} {options}"));
         assert!(refusal.code == 2 && refusal.stderr.contains(word), "{options}: {refusal:?}");
     }
     let refusal = folder.run("fit log.csv --time t -u u -y i --na 2 --nb 2 --couple full");
-    assert!(refusal.code == 2 && refusal.stderr.contains("--couple is for"), "{refusal:?}");
+    assert!(
+        refusal.code == 2 && refusal.stderr.contains("--couple: it is for --model arx with several outputs"),
+        "{refusal:?}"
+    );
     let refusal =
         folder.refused(&format!("fit {MOTOR} --na 150 --nb 150 --estimate 1..300 --report x.json"), 4);
     assert!(refusal.contains("lower orders") && !folder.names().contains(&"x.json".to_owned()), "{refusal}");

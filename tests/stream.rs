@@ -27,7 +27,7 @@ fn of(rows: usize) -> String {
 fn a_stream_gives_the_model_of_the_whole() {
     let folder = Folder::with_log(long());
     let whole = folder.fit("log.csv --na 2 --nb 2");
-    let stream = folder.fit("log.csv --na 2 --nb 2 --stream");
+    let stream = folder.planned("log.csv --na 2 --nb 2 --stream");
     assert!(deviation(&whole, &stream) < 1e-12);
     for figure in ["/estimation/mse", "/estimation/samples", "/fit/0/percent"] {
         let (whole, stream) = (number(&whole, figure), number(&stream, figure));

@@ -12,7 +12,8 @@ impl Command {
         let Files { read, written, makes_folders } = &mut files;
         match self {
             Self::Fit(fit) => {
-                read.extend(fit.grey.iter().chain(&fit.logs).cloned());
+                let documents = fit.grey.iter().chain(&fit.plan).chain(&fit.from);
+                read.extend(documents.chain(&fit.logs).cloned());
                 read.extend(fit.each.list.iter().cloned());
                 written.extend(fit.report.iter().chain(&fit.html).chain(&fit.each.table).cloned());
             }

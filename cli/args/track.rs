@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use thetahat::track::Policy;
 
-use super::{LineArguments, LiveClockArguments, LogArguments, MapArgument, Names};
+use super::{LineArguments, LiveClockArguments, LogArguments, Names};
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArguments {
@@ -57,7 +57,7 @@ pub(crate) struct TrackArguments {
         conflicts_with_all = ["model", "na", "nb", "nc", "constant", "method"],
         help_heading = "Model"
     )]
-    pub(crate) narx: Option<MapArgument>,
+    pub(crate) narx: Option<TrackMapArgument>,
     /// Past outputs that g reads: y(k-1), …, y(k-N) [default: 2]
     #[arg(long, value_name = "N", requires = "narx", help_heading = "Model")]
     pub(crate) ny: Option<usize>,
@@ -144,6 +144,12 @@ fn policies() -> String {
         "What is forgotten, several side by side: FACTOR for exponential:FACTOR, or {}",
         written.join(", ")
     )
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TrackMapArgument {
+    /// Products of regressors up to a degree
+    Poly,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

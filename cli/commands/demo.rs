@@ -9,7 +9,6 @@ use clap::Parser;
 use super::fit;
 use crate::args::{Arguments, Command, DemoArguments};
 use crate::failure::Failure;
-use crate::job::FitJob;
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_layout;
@@ -32,7 +31,7 @@ pub(crate) fn demo(arguments: &DemoArguments) -> Result<(), Failure> {
     let Command::Fit(fit) = parsed.command else {
         return Err(Failure::usage("the demo is a fit"));
     };
-    let found = fit::fitted(&FitJob::resolve(&fit)?)?;
+    let found = fit::fitted(&fit)?;
     let json = found.to_json().map_err(|error| Failure::data(error.to_string()))?;
     output::write(&report, |file| file.write_all(json.as_bytes()))?;
     for warning in &found.warnings {

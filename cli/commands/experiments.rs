@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use thetahat::data::{Log, Source};
+use thetahat::fit::FitDraft;
 
 use crate::failure::Failure;
 use crate::job::{FitJob, LogJob};
@@ -14,7 +15,7 @@ pub(crate) struct Experiments {
     pub(crate) sources: Vec<Source>,
     pub(crate) channels: Channels,
     /// What the reader should know, in plain words.
-    pub(crate) words: Vec<String>,
+    pub(crate) warnings: Vec<String>,
 }
 
 /// The columns that the model is about.
@@ -26,30 +27,34 @@ pub(crate) struct Channels {
 }
 
 /// Which columns are wanted.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Wanted<'a> {
+#[derive(Debug, Clone)]
+pub(crate) struct Wanted {
     /// Named inputs; none: those called u, u1, u2, …
-    pub(crate) inputs: Option<&'a [String]>,
+    pub(crate) inputs: Option<Vec<String>>,
     /// The named outputs; none: y.
-    pub(crate) outputs: &'a [String],
+    pub(crate) outputs: Vec<String>,
     /// Whether the model has inputs.
     pub(crate) driven: bool,
     /// What asks for a model without inputs.
-    pub(crate) none: &'a str,
+    pub(crate) none: &'static str,
 }
 
 /// Reads all logs, one after the other, with any clock or with an even one.
 pub(crate) fn experiments(job: &FitJob, any_clock: bool) -> Result<Experiments, Failure> {
-    read(&job.paths, &job.log, &wanted(job), any_clock, |inputs| job.orders.of(inputs).map(|_| ()))
+    let draft = job.draft()?;
+    let check = |inputs| draft.check_inputs(inputs).map_err(|error| Failure::option(&error));
+    read(&job.paths, &job.log, &Wanted::of(&draft), any_clock, check)
 }
 
-/// The columns that a polynomial model wants.
-pub(super) fn wanted(job: &FitJob) -> Wanted<'_> {
-    Wanted {
-        inputs: job.inputs.as_deref(),
-        outputs: &job.outputs,
-        driven: job.orders.has_inputs(),
-        none: "--nb 0",
+impl Wanted {
+    /// Those of a fit.
+    pub(super) fn of(draft: &FitDraft) -> Self {
+        Self {
+            inputs: draft.options().inputs(),
+            outputs: draft.options().outputs(),
+            driven: draft.is_driven(),
+            none: draft.asks_for_no_inputs(),
+        }
     }
 }
 
@@ -57,18 +62,18 @@ pub(super) fn wanted(job: &FitJob) -> Wanted<'_> {
 pub(super) fn read(
     paths: &[PathBuf],
     log: &LogJob,
-    wanted: &Wanted<'_>,
+    wanted: &Wanted,
     any_clock: bool,
     check: impl Fn(usize) -> Result<(), Failure>,
 ) -> Result<Experiments, Failure> {
     let mut channels: Option<Channels> = None;
-    let Joined { log, sources, words } =
+    let Joined { log, sources, warnings } =
         log::joined(paths, log, Clocks { any: any_clock, sample_time: None }, |path, header| {
             let own = Channels::same(wanted, path, header, &mut channels)?;
             check(own.inputs.len())?;
             Ok(own.inputs.into_iter().chain(own.outputs).collect())
         })?;
-    Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), words })
+    Ok(Experiments { log, sources, channels: channels.unwrap_or_default(), warnings })
 }
 
 impl Channels {
@@ -79,7 +84,7 @@ impl Channels {
 
     /// Those of a log, which are those of the logs before it.
     pub(super) fn same(
-        wanted: &Wanted<'_>,
+        wanted: &Wanted,
         path: &Path,
         header: &[String],
         known: &mut Option<Self>,
@@ -98,9 +103,9 @@ impl Channels {
     }
 
     /// The named ones, or those called u, u1, u2, … and y.
-    fn choose(wanted: &Wanted<'_>, header: &[String]) -> Result<Self, String> {
+    fn choose(wanted: &Wanted, header: &[String]) -> Result<Self, String> {
         let there_are = || format!("there are: {}", log::listed(header));
-        let outputs = match wanted.outputs {
+        let outputs = match &*wanted.outputs {
             [] if header.iter().any(|name| name == "y") => vec!["y".to_owned()],
             [] => {
                 return Err(format!("no column is called y; name the output with --output; {}", there_are()));
@@ -110,8 +115,8 @@ impl Channels {
         if !wanted.driven {
             return Ok(Self { inputs: Vec::new(), outputs });
         }
-        if let Some(inputs) = wanted.inputs {
-            return Ok(Self { inputs: inputs.to_vec(), outputs });
+        if let Some(inputs) = &wanted.inputs {
+            return Ok(Self { inputs: inputs.clone(), outputs });
         }
         let inputs = usual_inputs(header);
         if inputs.is_empty() {

@@ -63,12 +63,12 @@ fn made(
         export(None).map_err(|error| Failure::about(&error, |_| arguments.report.display().to_string()))?;
     let Some(path) = &arguments.path else { return Ok(plain) };
     // The channels that the log has.
-    let Loaded { log, source, words } = log::load(path, job, clocks, |header| {
+    let Loaded { log, source, warnings } = log::load(path, job, clocks, |header| {
         let outputs = outputs.iter().map(|output| output.name.clone());
         let inputs = inputs.iter().map(|input| input.name.clone());
         Ok(inputs.chain(outputs.filter(|name| header.contains(name))).collect())
     })?;
-    words.iter().for_each(|word| warn(word));
+    warnings.iter().for_each(|warning| warn(warning));
     export(Some(&log)).map_err(log::failure(&[source]))
 }
 

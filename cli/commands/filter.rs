@@ -116,11 +116,11 @@ impl<'a> Run<'a> {
     fn start(job: &'a FilterJob, filter: StateFilter) -> Result<Self, Failure> {
         let model = filter.model();
         let columns = Columns::new(job, model)?;
-        let (stream, words) = log::follow(&job.path, &job.log, false, None, |_| {
+        let (stream, warnings) = log::follow(&job.path, &job.log, false, None, |_| {
             Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
         })?;
         let lines = LineWriter::create(&job.lines.out, job.lines.format, columns.names())?;
-        words.iter().for_each(|word| warn(word));
+        warnings.iter().for_each(|warning| warn(warning));
         let fresh = job.smooth.then(|| filter.clone());
         let filter = if job.smooth { filter.recording() } else { filter };
         Ok(Self {

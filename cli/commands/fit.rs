@@ -1,22 +1,23 @@
 //! `thetahat fit`: from logs to a model and its report.
 
+use std::borrow::Cow;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use thetahat::Document;
 use thetahat::data::{Log, Rows, Source};
+use thetahat::model::GreyBox;
 use thetahat::present::{fit_page, tables};
-use thetahat::report::{Report, Validated, ValidationPlan, held_out_runs, identify_monitored, validate};
+use thetahat::report::{Report, Validated, ValidationPlan, held_out_runs, validate};
 
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
-use super::pieces::PiecesJob;
 use super::search::{Identified, Telling};
-use super::{grey_box, narx, process, state_space, stored};
-use crate::args::{EachArguments, FitArguments, FormatArgument, MapArgument};
+use super::{pieces, stored};
+use crate::args::{EachArguments, FitArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::{FitJob, GreyBoxJob, NarxJob, ProcessJob, StateSpaceJob, check_linear};
-use crate::log;
+use crate::job::FitJob;
+use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
 use crate::wrap::stdout_layout;
@@ -26,7 +27,7 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
         return each(&arguments.each, &arguments.logs, &of_many(arguments)?, |log| one(arguments, log));
     }
     let outputs = [&arguments.report, &arguments.html];
-    let Identified { report, log, sources } = resolved(arguments)?.found(&Telling::Aloud)?;
+    let Identified { report, log, sources } = found(&resolved(arguments)?, &Telling::Aloud)?;
     let json = report.to_json().map_err(|error| Failure::data(error.to_string()))?;
     let page =
         arguments.html.as_ref().zip(log).map(|(_, log)| page(&report, &log, &sources, line)).transpose()?;
@@ -47,83 +48,53 @@ pub(crate) fn fit(arguments: &FitArguments, line: &str) -> Result<(), Failure> {
     }
 }
 
-/// A fit, resolved: what model, and how it is fitted.
-enum Resolved {
-    GreyBox(Box<GreyBoxJob>),
-    Narx(Box<NarxJob>),
-    Process(Box<ProcessJob>),
-    StateSpace(Box<StateSpaceJob>),
-    /// The logs are read part by part.
-    Pieces(PiecesJob),
-    Polynomial {
-        job: Box<FitJob>,
-        /// Whether the log is wanted afterwards.
-        keeps_log: bool,
-    },
+fn resolved(arguments: &FitArguments) -> Result<FitJob, Failure> {
+    FitJob::resolve(arguments, stored::plan)
 }
 
-fn resolved(arguments: &FitArguments) -> Result<Resolved, Failure> {
-    check_linear(&arguments.narx)?;
-    if let Some(model) = &arguments.grey {
-        return Ok(Resolved::GreyBox(Box::new(GreyBoxJob::resolve(arguments, model)?)));
+/// Reads the logs, or the response, and fits the model.
+fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
+    if job.in_pieces {
+        return pieces::found(job, telling);
     }
-    if let Some(map) = MapArgument::asked(arguments.narx.narx).filter(|_| !arguments.stream) {
-        return Ok(Resolved::Narx(Box::new(NarxJob::resolve(arguments, map)?)));
+    if let Some(path) = &job.response {
+        let response = stored::response(path)?;
+        let draft = job.draft()?;
+        let report = telling.watched(|monitor| draft.fit_response(&response, monitor))?;
+        let report = report.map_err(log::failure(&response.logs))?;
+        return Ok(Identified { report, log: None, sources: Vec::new() });
     }
-    if let Some(job) = ProcessJob::resolve(arguments)? {
-        return Ok(Resolved::Process(Box::new(job)));
+    if let Some(path) = &job.equations {
+        return equations(job, path, telling);
     }
-    if arguments.stream {
-        return Ok(Resolved::Pieces(PiecesJob::resolve(arguments, false)?));
-    }
-    if let Some(job) = StateSpaceJob::resolve(arguments, false)? {
-        return Ok(Resolved::StateSpace(Box::new(job)));
-    }
-    let job = FitJob::resolve(arguments)?;
-    job.check_output()?;
-    Ok(Resolved::Polynomial { job: Box::new(job), keeps_log: arguments.html.is_some() })
-}
-
-impl Resolved {
-    /// The same without a word on how a log is read: with many logs there would be as many.
-    fn quiet(mut self) -> Self {
-        let log = match &mut self {
-            Self::GreyBox(job) => &mut job.log,
-            Self::Narx(job) => &mut job.log,
-            Self::Process(job) => &mut job.log,
-            Self::StateSpace(job) => &mut job.log,
-            Self::Pieces(job) => job.log(),
-            Self::Polynomial { job, .. } => &mut job.log,
-        };
-        log.quiet = true;
-        self
-    }
-
-    /// Reads the logs and fits the model.
-    fn found(&self, telling: &Telling) -> Result<Identified, Failure> {
-        match self {
-            Self::GreyBox(job) => grey_box::found(job, telling),
-            Self::Narx(job) => narx::found(job, telling),
-            Self::Process(job) => process::found(job, telling),
-            Self::StateSpace(job) => state_space::found(job, telling),
-            Self::Pieces(job) => job.found(telling),
-            Self::Polynomial { job, keeps_log } => found(job, *keeps_log, telling),
-        }
-    }
-}
-
-/// Reads the logs and fits the model.
-fn found(job: &FitJob, keeps_log: bool, telling: &Telling) -> Result<Identified, Failure> {
-    let Experiments { log, sources, channels, words } = experiments(job, false)?;
-    words.iter().for_each(|word| telling.warn(word));
-    let kept = keeps_log.then(|| log.clone());
-    let (inputs, output) = channels.single();
-    let plan = job.plan(inputs, output)?;
-    let report = telling.watched(|monitor| identify_monitored(log, &sources, &plan, monitor))?;
+    let draft = job.draft()?;
+    let Experiments { log, sources, channels, warnings } = experiments(job, draft.takes_any_clock())?;
+    warnings.iter().for_each(|warning| telling.warn(warning));
+    let plan = draft.plan(channels.inputs, channels.outputs).map_err(|error| Failure::option(&error))?;
+    let (report, kept) = if job.keeps_log {
+        (telling.watched(|monitor| plan.fit(Cow::Borrowed(&log), &sources, monitor))?, Some(log))
+    } else {
+        (telling.watched(|monitor| plan.fit(Cow::Owned(log), &sources, monitor))?, None)
+    };
     Ok(Identified { report: report.map_err(log::failure(&sources))?, log: kept, sources })
 }
 
-/// What fits of many logs have in common, in words that differ where they do: the options, and a model in equations.
+/// Reads the logs and fits the unknown parameters of a model in equations.
+fn equations(job: &FitJob, path: &Path, telling: &Telling) -> Result<Identified, Failure> {
+    let model = GreyBox::from_toml(&stored::text(path)?)
+        .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+    let draft = job.draft()?;
+    let Joined { log, sources, warnings } =
+        log::joined(&job.paths, &job.log, Clocks::from(&model), |_, _| {
+            Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
+        })?;
+    warnings.iter().for_each(|warning| telling.warn(warning));
+    let report = telling.watched(|monitor| draft.fit_equations(&model, &log, &sources, monitor))?;
+    Ok(Identified { report: report.map_err(log::failure(&sources))?, log: Some(log), sources })
+}
+
+/// What fits of many logs have in common, in words that differ where they do: the options, a plan, and a model in
+/// equations.
 fn of_many(arguments: &FitArguments) -> Result<String, Failure> {
     let own = FitArguments {
         logs: vec![PathBuf::from("log")],
@@ -132,15 +103,18 @@ fn of_many(arguments: &FitArguments) -> Result<String, Failure> {
     };
     // What is wrong with the options is so with all logs.
     resolved(&own)?;
-    let equations = arguments.grey.as_ref().map(|model| stored::text(model)).transpose()?;
-    Ok(format!("fit {own:?} {equations:?}"))
+    let text = |path: &Option<PathBuf>| path.as_deref().map(stored::text).transpose();
+    Ok(format!("fit {own:?} {:?} {:?}", text(&arguments.grey)?, text(&arguments.plan)?))
 }
 
 /// Fits a model to one log of many.
 fn one(arguments: &FitArguments, log: &Path) -> Result<Done, Failure> {
     let own = FitArguments { logs: vec![log.to_owned()], ..arguments.clone() };
     let telling = Telling::Kept(RefCell::default());
-    let Identified { report, .. } = resolved(&own)?.quiet().found(&telling)?;
+    // Without a word on how a log is read: with many logs there would be as many.
+    let mut job = resolved(&own)?;
+    job.log.quiet = true;
+    let Identified { report, .. } = found(&job, &telling)?;
     Done::new(&report, report.row(), telling.kept(), &report.warnings)
 }
 
@@ -159,7 +133,6 @@ fn page(report: &Report, log: &Log, sources: &[Source], line: &str) -> Result<St
 }
 
 /// Reads the logs and fits the model.
-pub(super) fn fitted(job: &FitJob) -> Result<Report, Failure> {
-    job.check_output()?;
-    Ok(found(job, false, &Telling::Aloud)?.report)
+pub(super) fn fitted(arguments: &FitArguments) -> Result<Report, Failure> {
+    Ok(found(&resolved(arguments)?, &Telling::Aloud)?.report)
 }

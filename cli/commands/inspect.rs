@@ -97,14 +97,14 @@ fn inspected_in(
     arguments: &InspectArguments,
     reader: Option<Reader>,
 ) -> Result<(Inspection, Option<Recording>), Failure> {
-    let (mut inspection, words, kept) = match reader {
+    let (mut inspection, warnings, kept) = match reader {
         Some(reader) => whole(reader, job, arguments.html.is_some())?,
         None => {
-            let (inspection, words) = in_parts(job)?;
-            (inspection, words, None)
+            let (inspection, warnings) = in_parts(job)?;
+            (inspection, warnings, None)
         }
     };
-    inspection.findings.splice(0..0, words.into_iter().map(Finding::reading));
+    inspection.findings.splice(0..0, warnings.into_iter().map(Finding::reading));
     inspection.command = job.command(arguments, &inspection);
     Ok((inspection, kept))
 }
@@ -117,12 +117,12 @@ fn whole(
     keeps: bool,
 ) -> Result<(Inspection, Vec<String>, Option<Recording>), Failure> {
     let mut chosen = Chosen::default();
-    let Recorded { recording, source, lines, mut words } =
+    let Recorded { recording, source, lines, mut warnings } =
         log::record(reader, &job.path, &job.log, |reader| {
             chosen = Chosen::new(job, reader)?;
             Ok(chosen.columns.clone())
         })?;
-    words.append(&mut chosen.words);
+    warnings.append(&mut chosen.warnings);
     let kept = keeps.then(|| recording.clone());
     let mut plan = chosen.plan(job);
     // Topics are on one clock already.
@@ -134,7 +134,7 @@ fn whole(
     if source.resampled.is_some() {
         inspection.log.resampled = source.resampled;
     }
-    Ok((inspection, words, kept))
+    Ok((inspection, warnings, kept))
 }
 
 /// The inspection of a log that is read part by part, and what the reader should know of how it was read.
@@ -145,10 +145,10 @@ fn in_parts(job: &InspectJob) -> Result<(Inspection, Vec<String>), Failure> {
     let mut left_out = Vec::new();
     let choose = |reader: &Reader| {
         let mut chosen = Chosen::new(job, reader)?;
-        left_out.append(&mut chosen.words);
+        left_out.append(&mut chosen.warnings);
         Ok((chosen.columns.clone(), 0, chosen.plan(job)))
     };
-    let mut words = log::in_parts(&job.path, &job.log, choose, &mut |plan, mut part| {
+    let mut warnings = log::in_parts(&job.path, &job.log, choose, &mut |plan, mut part| {
         let taken = part.taken();
         let (sums, source) = match &mut inspection {
             Some(begun) => begun,
@@ -160,10 +160,10 @@ fn in_parts(job: &InspectJob) -> Result<(Inspection, Vec<String>), Failure> {
         source.rows = part.source.rows;
         sums.add(taken).map_err(|error| part.failure(&error))
     })?;
-    words.append(&mut left_out);
+    warnings.append(&mut left_out);
     let (sums, source) =
         inspection.ok_or_else(|| Failure::data(format!("{file}: there is no row; record at least one")))?;
-    Ok((sums.finish(&source).map_err(failed)?, words))
+    Ok((sums.finish(&source).map_err(failed)?, warnings))
 }
 
 /// This many columns that are left out for one reason are named.
@@ -176,7 +176,7 @@ struct Chosen {
     inputs: Vec<String>,
     output: Option<String>,
     /// What was left out, in plain words.
-    words: Vec<String>,
+    warnings: Vec<String>,
 }
 
 impl Chosen {
@@ -201,7 +201,7 @@ impl Chosen {
             chosen.inputs.retain(|input| chosen.output.as_ref() != Some(input));
         }
         chosen.columns = if job.is_named() {
-            chosen.words.clear();
+            chosen.warnings.clear();
             chosen.inputs.iter().chain(&chosen.output).cloned().collect()
         } else {
             readable
@@ -249,11 +249,11 @@ impl Chosen {
         for (columns, reason) in left_out.iter().zip(REASONS) {
             for &column in columns.iter().take(MOST_TOLD) {
                 let name = text::brief(&names[column], 40);
-                self.words.push(format!("column {} ('{name}') is left out: {reason}", column + 1));
+                self.warnings.push(format!("column {} ('{name}') is left out: {reason}", column + 1));
             }
             if columns.len() > MOST_TOLD {
                 let more = columns.len() - MOST_TOLD;
-                self.words.push(format!("{more} more columns are left out for the same reason: {reason}"));
+                self.warnings.push(format!("{more} more columns are left out for the same reason: {reason}"));
             }
         }
         readable

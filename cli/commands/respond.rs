@@ -80,8 +80,8 @@ fn respond(
         let inputs = model.inputs().iter().map(|input| input.name.clone());
         Ok(inputs.chain(outputs().filter(|name| header.contains(name))).collect())
     });
-    let Loaded { log, source, words } = loaded?;
-    words.iter().for_each(|word| warn(word));
+    let Loaded { log, source, warnings } = loaded?;
+    warnings.iter().for_each(|warning| warn(warning));
     let natural = || if measured { model.natural_start(horizon) } else { InitialCondition::Zero };
     let initial = initial.unwrap_or_else(natural);
     let sources = [source];

@@ -32,10 +32,10 @@ pub(super) enum Telling {
 
 impl Telling {
     /// Says something that the reader should know.
-    pub(super) fn warn(&self, word: &str) {
+    pub(super) fn warn(&self, warning: &str) {
         match self {
-            Self::Aloud => warn(word),
-            Self::Kept(words) => words.borrow_mut().push(with_options(word)),
+            Self::Aloud => warn(warning),
+            Self::Kept(warnings) => warnings.borrow_mut().push(with_options(warning)),
         }
     }
 
@@ -43,7 +43,7 @@ impl Telling {
     pub(super) fn kept(self) -> Vec<String> {
         match self {
             Self::Aloud => Vec::new(),
-            Self::Kept(words) => words.into_inner(),
+            Self::Kept(warnings) => warnings.into_inner(),
         }
     }
 

@@ -40,17 +40,17 @@ pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), 
 /// Reads the logs and estimates the response.
 fn measured(job: &SpectrumJob) -> Result<MeasuredResponse, Failure> {
     let wanted = Wanted {
-        inputs: job.inputs.as_deref(),
-        outputs: job.output.as_slice(),
+        inputs: job.inputs.clone(),
+        outputs: job.output.iter().cloned().collect(),
         driven: true,
         none: "no inputs",
     };
-    let Experiments { log, sources, channels, words } =
+    let Experiments { log, sources, channels, warnings } =
         read(&job.paths, &job.log, &wanted, false, |_| Ok(()))?;
     let (inputs, output) = channels.single();
     let plan = job.plan(inputs, output)?;
     let mut found = estimated(&log, &sources, &plan).map_err(log::failure(&sources))?;
-    found.warnings.splice(0..0, words);
+    found.warnings.splice(0..0, warnings);
     Ok(found)
 }
 

@@ -80,8 +80,12 @@ fn is_json(path: &Path) -> Result<bool, Failure> {
 /// Reads the log and evaluates its steps.
 fn tested(job: &StepTestJob) -> Result<(StepTest, Log), Failure> {
     let named = job.input.as_ref().map(|name| vec![name.clone()]);
-    let wanted =
-        Wanted { inputs: named.as_deref(), outputs: job.output.as_slice(), driven: true, none: "no inputs" };
+    let wanted = Wanted {
+        inputs: named.clone(),
+        outputs: job.output.iter().cloned().collect(),
+        driven: true,
+        none: "no inputs",
+    };
     let one = |inputs: usize| match inputs {
         1 => Ok(()),
         _ => Err(Failure::usage(format!(
@@ -89,11 +93,11 @@ fn tested(job: &StepTestJob) -> Result<(StepTest, Log), Failure> {
         ))),
     };
     let paths = [job.path.clone()];
-    let Experiments { log, sources, channels, words } = read(&paths, &job.log, &wanted, true, one)?;
+    let Experiments { log, sources, channels, warnings } = read(&paths, &job.log, &wanted, true, one)?;
     let (mut inputs, output) = channels.single();
     let plan = job.plan(inputs.pop().unwrap_or_default(), output);
     let mut found = step_test(&log, &sources, &plan).map_err(log::failure(&sources))?;
-    found.warnings.splice(0..0, words);
+    found.warnings.splice(0..0, warnings);
     Ok((found, log))
 }
 

@@ -4,8 +4,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use serde_json::Value;
 use thetahat::Document;
 use thetahat::model::{LinearModel, Model, PolynomialModel};
+use thetahat::plan::FitOptions;
 use thetahat::report::Report;
 use thetahat::spectrum::MeasuredResponse;
 
@@ -46,6 +48,21 @@ pub(super) fn report(path: &Path) -> Result<Report, Failure> {
 /// The report that the text of a file is.
 pub(super) fn report_of(path: &Path, text: &str) -> Result<Report, Failure> {
     Report::from_json(text).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
+}
+
+/// The options of a fit, as a file has them: a plan, or the report of a fit, which holds its own.
+pub(crate) fn plan(path: &Path) -> Result<FitOptions, Failure> {
+    let bad = |message: String| Failure::data(format!("{}: {message}", path.display()));
+    let text = text(path)?;
+    let value: Value =
+        serde_json::from_str(&text).map_err(|error| bad(format!("this is no plan in JSON: {error}")))?;
+    let plan = if value.get("schema").is_some() {
+        let report = report_of(path, &text)?;
+        return report.plan.ok_or_else(|| bad("the report holds no plan; fit it again".to_owned()));
+    } else {
+        value.as_object().ok_or_else(|| bad("a plan is an object of options in JSON".to_owned()))?
+    };
+    FitOptions::of(plan).map_err(|error| Failure::option(&error).of(path))
 }
 
 /// A stored response of spectrum.

@@ -103,7 +103,7 @@ impl<'a> Run<'a> {
         };
         let mut chosen = None;
         let start = stored.as_ref().and_then(|state| state.start.as_deref());
-        let (stream, words) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
+        let (stream, warnings) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
             let channels = channels::choose(job, report, header)
                 .map_err(|message| Failure::data(format!("{name}: {message}")))?;
             let names = channels.inputs.iter().chain(&channels.outputs).cloned().collect();
@@ -144,7 +144,7 @@ impl<'a> Run<'a> {
         } else {
             LineWriter::create(&job.lines.out, job.lines.format, columns.names())?
         };
-        words.iter().for_each(|word| warn(word));
+        warnings.iter().for_each(|warning| warn(warning));
         let memory = Memory::of(&state.trackers);
         Ok(Self {
             job,

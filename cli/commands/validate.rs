@@ -107,7 +107,7 @@ pub(super) fn loaded(
         any: all().any(|clocks| clocks.any),
     };
     let loaded = log::load(path, &job.log, clocks, |_| Ok(names))?;
-    loaded.words.iter().for_each(|word| telling.warn(word));
+    loaded.warnings.iter().for_each(|warning| telling.warn(warning));
     Ok(loaded)
 }
 

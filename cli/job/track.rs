@@ -7,9 +7,7 @@ use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
 
 use super::fit::named_values;
 use super::{LineJob, LogJob, parsed};
-use crate::args::{
-    MapArgument, Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument,
-};
+use crate::args::{Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
 use crate::failure::Failure;
 
 /// A model to track.
@@ -94,11 +92,6 @@ impl TrackJob {
             alarm_interval: arguments.alarm,
             ..TrackPlan::default()
         };
-        if arguments.narx.is_some_and(|map| map != MapArgument::Poly) {
-            return Err(Failure::usage(
-                "--narx: products of lags (poly) are tracked without a fit; other functions come from its report, with --warm",
-            ));
-        }
         let lags = [
             ("--ny", arguments.ny.is_some()),
             ("--nu", !arguments.nu.is_empty()),

@@ -20,6 +20,13 @@ create_exception!(
 
 /// What the batch library says.
 pub(crate) fn batch(py: Python<'_>, error: thetahat::Error) -> PyErr {
+    // Options of several words have a hyphen, keyword arguments an underscore.
+    let error = match error {
+        thetahat::Error::Argument { argument, message } => {
+            thetahat::Error::Argument { argument: argument.replace('-', "_"), message }
+        }
+        other => other,
+    };
     let message = in_python(&error.to_string());
     match error {
         thetahat::Error::Interrupted => PyKeyboardInterrupt::new_err(()),

@@ -1,6 +1,5 @@
 //! One model of experiments that other processes hold.
 
-use std::ffi::OsString;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use pyo3::prelude::*;
@@ -8,12 +7,14 @@ use pyo3::types::PyBytes;
 use thetahat::Error;
 use thetahat::estimate::{Answer, Ask, Question};
 use thetahat::optimize::Monitor;
+use thetahat::plan::Fitted;
 use thetahat::report::{self, Experiments as Described, Plan};
 
 use crate::error;
 use crate::grey_box::GreyBox;
 use crate::log::Log;
 use crate::model::Model;
+use crate::plan::draft;
 use crate::work::{interruptible, interruptible_apart};
 
 /// Experiments that others hold, as one model of all of them sees them.
@@ -26,11 +27,11 @@ impl Experiments {
     #[classattr]
     const FETCHED_BELOW: usize = Described::FETCHED_BELOW;
 
-    /// Those of a log, with the options of `thetahat fit`.
+    /// Those of a log, with the options of a plan in JSON.
     #[new]
-    fn new(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Self> {
+    fn new(py: Python<'_>, log: &Bound<'_, Log>, plan: &str) -> PyResult<Self> {
         let log = log.get();
-        let plan = plan_of(py, log, &options)?;
+        let plan = plan_of(py, log, plan)?;
         let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
         let made = interruptible(py, move |_| Described::new(&channels, &sources, &plan))?;
         Ok(Self(Arc::new(made)))
@@ -63,14 +64,14 @@ impl Experiments {
     }
 
     /// What is to be taken from each channel, the inputs first.
-    fn offsets(&self, py: Python<'_>, options: Vec<OsString>) -> PyResult<Vec<f64>> {
-        let plan = self.plan(py, &options)?;
+    fn offsets(&self, py: Python<'_>, plan: &str) -> PyResult<Vec<f64>> {
+        let plan = self.plan(py, plan)?;
         self.0.offsets(&plan).map_err(|error| error::batch(py, error))
     }
 
     /// The model, see [`asking`].
-    fn fit(&self, py: Python<'_>, options: Vec<OsString>, ask: Py<PyAny>) -> PyResult<Model> {
-        let plan = self.plan(py, &options)?;
+    fn fit(&self, py: Python<'_>, plan: &str, ask: Py<PyAny>) -> PyResult<Model> {
+        let plan = self.plan(py, plan)?;
         let all = Arc::clone(&self.0);
         asking(py, ask, move |ask, monitor| all.fit(&plan, ask, monitor)).map(Model::of)
     }
@@ -89,10 +90,12 @@ impl Experiments {
 }
 
 impl Experiments {
-    fn plan(&self, py: Python<'_>, options: &[OsString]) -> PyResult<Plan> {
+    fn plan(&self, py: Python<'_>, plan: &str) -> PyResult<Plan> {
         let mut inputs: Vec<String> = self.0.channels().into_iter().map(str::to_owned).collect();
         let output = inputs.pop().unwrap_or_default();
-        thetahat_cli::plan(options, inputs, output).map_err(|failure| error::program(py, &failure))
+        let draft = draft(py, plan, Fitted::Log { several_outputs: false })?;
+        let plan = draft.plan(inputs, vec![output]).map_err(|error| error::batch(py, error))?;
+        plan.polynomial().cloned().map_err(|error| error::batch(py, error))
     }
 }
 
@@ -130,9 +133,8 @@ fn asked(py: Python<'_>, ask: &Py<PyAny>, questions: &[Question]) -> PyResult<Ve
     answers.iter().map(|answer| Answer::from_bytes(answer.as_bytes()).map_err(failed)).collect()
 }
 
-fn plan_of(py: Python<'_>, log: &Log, options: &[OsString]) -> PyResult<Plan> {
-    thetahat_cli::plan(options, log.inputs.clone(), log.output()?.clone())
-        .map_err(|failure| error::program(py, &failure))
+fn plan_of(py: Python<'_>, log: &Log, plan: &str) -> PyResult<Plan> {
+    log.plan(py, plan)?.polynomial().cloned().map_err(|error| error::batch(py, error))
 }
 
 /// A log without the offsets of its channels.
@@ -140,11 +142,11 @@ fn plan_of(py: Python<'_>, log: &Log, options: &[OsString]) -> PyResult<Plan> {
 pub(crate) fn deviations(
     py: Python<'_>,
     log: &Bound<'_, Log>,
-    options: Vec<OsString>,
+    plan: &str,
     offsets: Vec<f64>,
 ) -> PyResult<Log> {
     let log = log.get();
-    let plan = plan_of(py, log, &options)?;
+    let plan = plan_of(py, log, plan)?;
     let channels = Arc::clone(&log.log);
     let taken = interruptible(py, move |_| Described::deviations(&channels, &plan, &offsets))?;
     let (inputs, outputs) = (log.inputs.clone(), log.outputs.clone());
@@ -156,11 +158,11 @@ pub(crate) fn deviations(
 pub(crate) fn answer<'py>(
     py: Python<'py>,
     log: &Bound<'py, Log>,
-    options: Vec<OsString>,
+    plan: &str,
     question: &[u8],
 ) -> PyResult<Bound<'py, PyBytes>> {
     let log = log.get();
-    let plan = plan_of(py, log, &options)?;
+    let plan = plan_of(py, log, plan)?;
     let channels = Arc::clone(&log.log);
     let question = Question::from_bytes(question).map_err(|error| error::batch(py, error))?;
     let answer = interruptible(py, move |_| Described::answer(&channels, &plan, &question)?.to_bytes())?;
@@ -182,18 +184,19 @@ pub(crate) fn answer_equations<'py>(
     Ok(PyBytes::new(py, &answer))
 }
 
-/// Fits a model in equations to logs of which others have some each, with the options of `thetahat fit --grey`, see
+/// Fits a model in equations to logs of which others have some each, with the options of a plan, see
 /// [`asking`].
 #[pyfunction]
 pub(crate) fn fit_equations_distributed(
     py: Python<'_>,
     log: &Bound<'_, Log>,
     model: &Bound<'_, GreyBox>,
-    options: Vec<OsString>,
+    plan: &str,
     counts: Vec<usize>,
     ask: Py<PyAny>,
 ) -> PyResult<Model> {
-    let plan = thetahat_cli::equations_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let draft = draft(py, plan, Fitted::Equations)?;
+    let plan = draft.equations_plan().map_err(|error| error::batch(py, error))?.clone();
     let log = log.get();
     let (channels, sources, model) = (Arc::clone(&log.log), log.sources.clone(), model.get().0.clone());
     let found = asking(py, ask, move |ask, monitor| {

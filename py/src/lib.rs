@@ -2,7 +2,7 @@
 //!
 //! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half,
 //! `online` the steppers, `filter` and `track` the steppers behind logs. `journal` is what has been done with which of
-//! many logs. `array` reads and makes NumPy arrays, `error` is the one map of errors, `in_use` what is said of an
+//! many logs. `plan` reads options of a fit, `array` reads and makes NumPy arrays, `error` is the one map of errors, `in_use` what is said of an
 //! object that another call uses, `work` runs what takes long.
 
 mod array;
@@ -18,6 +18,7 @@ mod log;
 mod model;
 mod normal_equations;
 mod online;
+mod plan;
 mod track;
 mod work;
 
@@ -58,10 +59,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(track::policy, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
-    module.add_function(wrap_pyfunction!(model::fit_narx, module)?)?;
-    module.add_function(wrap_pyfunction!(model::fit_process, module)?)?;
-    module.add_function(wrap_pyfunction!(model::fit_process_to_response, module)?)?;
-    module.add_function(wrap_pyfunction!(model::fit_state_space, module)?)?;
+    module.add_function(wrap_pyfunction!(model::fit_response, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::validate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;

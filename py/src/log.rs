@@ -7,10 +7,14 @@ use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
+use thetahat::Error;
 use thetahat::data::{Channel, Interpolation, Resample, Resampling, Rows, Source};
+use thetahat::fit::FitPlan;
+use thetahat::plan::Fitted;
 
 use crate::array::vector;
 use crate::error;
+use crate::plan::draft;
 use crate::work::{awaited, interruptible};
 
 /// Channels on a common clock, where they came from, and which of them are inputs and outputs.
@@ -23,6 +27,26 @@ pub(crate) struct Log {
     /// At least one.
     #[pyo3(get)]
     pub(crate) outputs: Vec<String>,
+}
+
+impl Log {
+    /// The fit of this log with the options of a plan in JSON.
+    pub(crate) fn plan(&self, py: Python<'_>, plan: &str) -> PyResult<FitPlan> {
+        let draft = draft(py, plan, Fitted::Log { several_outputs: self.outputs.len() > 1 })?;
+        draft.plan(self.inputs.clone(), self.outputs.clone()).map_err(|error| match error {
+            Error::Argument { argument, .. } if argument == "output" => self.several_outputs(),
+            other => error::batch(py, other),
+        })
+    }
+
+    /// There are several outputs, and a model has one.
+    fn several_outputs(&self) -> PyErr {
+        PyValueError::new_err(format!(
+            "log: it has {} outputs ({}), and the model one; take it with log.select(output=...)",
+            self.outputs.len(),
+            self.outputs.join(", ")
+        ))
+    }
 }
 
 /// Channels by name.
@@ -237,20 +261,6 @@ impl Log {
         let sources =
             serde_json::from_str(&sources).map_err(|error| PyValueError::new_err(error.to_string()))?;
         Ok(Self { log: Arc::new(log), sources, inputs, outputs })
-    }
-}
-
-impl Log {
-    /// The output of a model that has one.
-    pub(crate) fn output(&self) -> PyResult<&String> {
-        match self.outputs.as_slice() {
-            [only] => Ok(only),
-            all => Err(PyValueError::new_err(format!(
-                "log: it has {} outputs ({}), and the model one; take it with log.select(output=...)",
-                all.len(),
-                all.join(", ")
-            ))),
-        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Fitted models: the report of a fit, and what can be computed with it.
 
-use std::ffi::OsString;
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
@@ -10,6 +10,7 @@ use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::export::{Plan, export};
 use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
+use thetahat::plan::Fitted;
 use thetahat::present::tables;
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{Draws, Horizon, InitialCondition, TransientResponse, logarithmic_frequencies};
@@ -19,6 +20,7 @@ use crate::array::{from_matrix, matrix, vector};
 use crate::error;
 use crate::grey_box::GreyBox;
 use crate::log::{Log, copy};
+use crate::plan::draft;
 use crate::work::interruptible;
 
 /// Names of files, and what they hold.
@@ -40,90 +42,46 @@ pub(crate) struct Model {
 /// An array with one value for each row.
 type Column<'py> = Bound<'py, PyArray1<f64>>;
 
-/// Fits a model to a log with the options of `thetahat fit`.
+/// Fits a model to a log with options of a fit, a plan in JSON.
 #[pyfunction]
-pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
+pub(crate) fn fit(py: Python<'_>, log: &Bound<'_, Log>, plan: &str) -> PyResult<Model> {
     let log = log.get();
-    let plan = thetahat_cli::plan(&options, log.inputs.clone(), log.output()?.clone())
-        .map_err(|failure| error::program(py, &failure))?;
+    let plan = log.plan(py, plan)?;
     let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
     let pending = interruptible(py, move |monitor| {
-        let names: Vec<&str> = plan.inputs.iter().chain([&plan.output]).map(String::as_str).collect();
-        PendingEvaluation::new(copy(&channels, &names)?, &sources, &plan, monitor)
+        let names = plan.channels();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let own = if plan.polynomial().is_ok() {
+            Cow::Owned(copy(&channels, &names)?)
+        } else {
+            Cow::Borrowed(&*channels)
+        };
+        plan.begin(own, &sources, monitor)
     })?;
     Ok(Model::waiting(pending, log))
 }
 
-/// Fits a model in equations to a log with the options of `thetahat fit --grey`.
+/// Fits a model in equations to a log with options of a fit, a plan in JSON.
 #[pyfunction]
 pub(crate) fn fit_equations(
     py: Python<'_>,
     log: &Bound<'_, Log>,
     model: &Bound<'_, GreyBox>,
-    options: Vec<OsString>,
+    plan: &str,
 ) -> PyResult<Model> {
-    let plan = thetahat_cli::equations_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let draft = draft(py, plan, Fitted::Equations)?;
     let log = log.get();
     let (channels, sources, model) = (Arc::clone(&log.log), log.sources.clone(), model.get().0.clone());
-    let report = interruptible(py, move |monitor| {
-        thetahat::report::fit_equations(&model, &channels, &sources, &plan, monitor)
-    })?;
+    let report = interruptible(py, move |monitor| draft.fit_equations(&model, &channels, &sources, monitor))?;
     Ok(Model::of(report))
 }
 
-/// Fits a nonlinear ARX model to a log with the options of `thetahat fit --narx`.
+/// Fits a process to the document of a frequency response with options of a fit, a plan in JSON.
 #[pyfunction]
-pub(crate) fn fit_narx(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
-    let log = log.get();
-    let plan = thetahat_cli::narx_plan(&options, log.inputs.clone(), log.outputs.clone())
-        .map_err(|failure| error::program(py, &failure))?;
-    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report = interruptible(py, move |monitor| {
-        thetahat::report::fit_nonlinear_arx_monitored(&channels, &sources, &plan, monitor)
-    })?;
-    Ok(Model::of(report))
-}
-
-/// Fits a process in continuous time to a log with the options of `thetahat fit --structure`.
-#[pyfunction]
-pub(crate) fn fit_process(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>) -> PyResult<Model> {
-    let log = log.get();
-    let plan = thetahat_cli::process_plan(&options, log.inputs.clone(), log.output()?.clone())
-        .map_err(|failure| error::program(py, &failure))?;
-    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let report =
-        interruptible(py, move |monitor| thetahat::report::fit_process(&channels, &sources, &plan, monitor))?;
-    Ok(Model::of(report))
-}
-
-/// Fits a state-space model to a log with the options of `thetahat fit --model ss`.
-#[pyfunction]
-pub(crate) fn fit_state_space(
-    py: Python<'_>,
-    log: &Bound<'_, Log>,
-    options: Vec<OsString>,
-) -> PyResult<Model> {
-    let log = log.get();
-    let plan = thetahat_cli::state_space_plan(&options, log.inputs.clone(), log.outputs.clone())
-        .map_err(|failure| error::program(py, &failure))?;
-    let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-    let pending =
-        interruptible(py, move |monitor| PendingEvaluation::of_states(&channels, &sources, &plan, monitor))?;
-    Ok(Model::waiting(pending, log))
-}
-
-/// Fits a process to the document of a frequency response with the options of `thetahat fit --from`.
-#[pyfunction]
-pub(crate) fn fit_process_to_response(
-    py: Python<'_>,
-    response: &str,
-    options: Vec<OsString>,
-) -> PyResult<Model> {
-    let plan = thetahat_cli::response_plan(&options).map_err(|failure| error::program(py, &failure))?;
+pub(crate) fn fit_response(py: Python<'_>, response: &str, plan: &str) -> PyResult<Model> {
+    let draft = draft(py, plan, Fitted::Response)?;
     let response = MeasuredResponse::from_json(response).map_err(|error| error::batch(py, error))?;
-    let report = interruptible(py, move |monitor| {
-        thetahat::report::fit_process_to_response(&response, &plan, monitor)
-    })?;
+    let report = interruptible(py, move |monitor| draft.fit_response(&response, monitor))?;
     Ok(Model::of(report))
 }
 

@@ -1,6 +1,5 @@
 //! One model from many pieces of the data.
 
-use std::ffi::OsString;
 use std::sync::Arc;
 
 use pyo3::prelude::*;
@@ -19,14 +18,13 @@ pub(crate) struct NormalEquations(Arc<Sums>);
 
 #[pymethods]
 impl NormalEquations {
-    /// Those of a piece of which the first `past` rows are of the one before it, with the options of `thetahat fit`.
+    /// Those of a piece of which the first `past` rows are of the one before it, with the options of a plan in JSON.
     #[new]
-    fn new(py: Python<'_>, log: &Bound<'_, Log>, options: Vec<OsString>, past: usize) -> PyResult<Self> {
+    fn new(py: Python<'_>, log: &Bound<'_, Log>, plan: &str, past: usize) -> PyResult<Self> {
         let log = log.get();
-        let making = thetahat_cli::pieces(&options, log.inputs.clone(), log.outputs.clone())
-            .map_err(|failure| error::program(py, &failure))?;
+        let plan = log.plan(py, plan)?;
         let (channels, sources) = (Arc::clone(&log.log), log.sources.clone());
-        let made = interruptible(py, move |_| making(&channels, &sources, past))?;
+        let made = interruptible(py, move |_| plan.pieces(&channels, &sources, past))?;
         Ok(Self(Arc::new(made)))
     }
 

@@ -65,7 +65,8 @@ def test_a_model_is_for_what_focus_says() -> None:
     assert chosen is not None and chosen["focus"] == "simulation"
     assert chosen["chosen"] == chosen["winners"]["simulation"]
     assert chosen["chosen"]["held_out"]["refits"] == 3
-    for wrong in ("free", 0, -1):
+    focuses: list[Any] = ["free", 0, -1]
+    for wrong in focuses:
         with pytest.raises(ValueError, match="focus"):
             th.arx(motor, 2, 2, focus=wrong)
 
@@ -163,7 +164,7 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, True, 2), TypeError, "na: expected an int"),
     (lambda log: th.arx(log, [2], 2), TypeError, "na: expected an int or a range"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, []), ValueError, "nb: there is none"),
-    (lambda log: th.arx(log, 2, [1, 2, 3]), ValueError, "nb has 3 values for 2 inputs"),
+    (lambda log: th.arx(log, 2, [1, 2, 3]), ValueError, "nb: 3 values for 2 inputs"),
     (lambda log: th.arx(log, 10**9, 2), ValueError, "na: 1000000000 is above 1000"),
     (lambda log: th.arx(log, 10**30, 2), ValueError, "na"),
     (lambda log: th.arx(log[:50], 30, 2), th.EstimationError, "too few rows"),
@@ -175,13 +176,13 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, estimate=slice(0, 10, 2)), ValueError, "estimate: a step of 2"),
     (lambda log: th.arx(log, 2, 2, estimate=5), TypeError, "estimate: expected a slice"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, detrend="cubic"), ValueError, "detrend"),
-    (lambda log: th.arx(log, 2, 2, initial="cold"), ValueError, "initial"),
-    (lambda log: th.arx(log, 2, 2, constant="perhaps"), ValueError, "constant"),
+    (lambda log: th.arx(log, 2, 2, initial="cold"), ValueError, "initial"),  # type: ignore[arg-type]
+    (lambda log: th.arx(log, 2, 2, constant="perhaps"), ValueError, "constant"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, constant="no", trend=True), ValueError, "trend"),
     (lambda log: th.arx(log, 2, 2, constant="yes", initial="zero"), ValueError, "constant"),
     (lambda log: th.arx(log, 2, 2, trend=1), TypeError, "trend: expected True or False"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, norm=3), ValueError, "norm"),
-    (lambda log: th.oe(log, 2, 2, norm="infinity"), ValueError, "norm infinity: give 2, 1, huber"),
+    (lambda log: th.oe(log, 2, 2, norm="infinity"), ValueError, "norm: 'infinity': give 2, 1, huber"),
     (lambda log: th.oe(log, 2, 2, prefilter="0.4"), ValueError, "prefilter: '0.4' is no band"),
     (lambda log: th.oe(log, 2, 2, prefilter=(0.1, 0.6)), ValueError, "prefilter: 0.6 Hz is not below 0.5 Hz"),
     (lambda log: th.arx(log, 2, 2, ridge=-1.0), ValueError, "ridge"),
@@ -189,14 +190,14 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.arx(log, 2, 2, bound={"z9": 1.0}), ValueError, "z9"),
     (lambda log: th.arx(log, 2, 2, bound=[1]), TypeError, "bound: expected a dict"),  # type: ignore[arg-type]
     (lambda log: th.arx(log, 2, 2, offset={"w": 1.0}), ValueError, "offset: 'w' is neither"),
-    (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "unexpected keyword argument 'oofset'"),  # type: ignore[call-arg]
-    (lambda log: th.oe(log, 2, 2, search="magic"), ValueError, "search"),
+    (lambda log: th.arx(log, 2, 2, oofset={}), TypeError, "no argument 'oofset'; did you mean 'offset'"),  # type: ignore[call-arg]
+    (lambda log: th.oe(log, 2, 2, search="magic"), ValueError, "search"),  # type: ignore[arg-type]
     (lambda log: th.oe(log, 2, 2, max_iterations=0), ValueError, "max_iterations"),
     (lambda log: th.oe(log, 2, 2, tolerance=-1.0), ValueError, "tolerance"),
-    (lambda log: th.oe(log, 2, 2, initial="drop"), ValueError, "initial drop"),
+    (lambda log: th.oe(log, 2, 2, initial="drop"), ValueError, "initial: drop"),
     (lambda log: th.search(log, na=range(5, 2)), ValueError, "na: range.* is empty"),
     (lambda log: th.search(log, na=range(1, 9, 3)), ValueError, "na: a step of 3"),
-    (lambda log: th.search(log, model="magic"), ValueError, "model"),
+    (lambda log: th.search(log, model="magic"), ValueError, "model"),  # type: ignore[arg-type]
     (lambda log: th.search(log, na=2, nb=2, select="mdl"), ValueError, "select"),
     (lambda log: th.search(log, select="luck"), ValueError, "select"),
     (lambda log: th.arx("log.csv", 2, 2), TypeError, "log: expected a Log, found str"),  # type: ignore[arg-type]
@@ -208,8 +209,8 @@ BAD: list[tuple[Callable[[th.Log], Any], type[Exception], str]] = [
     (lambda log: th.inspect(5), TypeError, "path: expected a str or a path"),  # type: ignore[arg-type]
     (lambda log: th.inspect("none.csv"), FileNotFoundError, "none.csv"),
     (lambda log: th.search(th.Log(log.y, np.random.default_rng(0).random((2000, 101)))), ValueError, "inputs: 101 are too many"),
-    (lambda log: th.oe(log, 2, 2, seed=-1, starts=1), ValueError, "seed: -1"),
-    (lambda log: th.oe(log, 2, 2, seed=1), ValueError, "starts is needed"),
+    (lambda log: th.oe(log, 2, 2, seed=-1, starts=1), ValueError, "seed: '-1'"),
+    (lambda log: th.oe(log, 2, 2, seed=1), ValueError, "seed: .* give starts too"),
     (lambda log: th.read_csv([]), ValueError, "path: there is none"),
     (lambda log: th.read_csv(open(os.devnull)), TypeError, "path: expected a str or a path, found TextIOWrapper"),  # type: ignore[arg-type]
     (lambda log: th.Model(), TypeError, "models are made by fits"),
@@ -356,8 +357,8 @@ def test_options_are_keyword_parameters(function: Any, options: Any) -> None:
     for name in shown & known:
         assert own[name] in (told[name], Optional[told[name]]), name
         assert parameters[name].default is None or options is th.ReadOptions
-        assert re.search(rf"\b{name}\b", function.__doc__), name
-        assert re.search(rf"^    (\w+, )*{name}(, \w+)* : ", options.__doc__, flags=re.M), name
+        assert options is th.FitOptions or re.search(rf"\b{name}\b", function.__doc__), name
+        assert re.search(rf"^    (\w+, )*{name}(, \w+)*( : |$)", options.__doc__, flags=re.M), name
 
 
 def test_a_fit_without_time_looks_for_one_start(log: th.Log) -> None:

@@ -252,7 +252,7 @@ def test_files_are_read_as_on_the_command_line(tmp_path: Path) -> None:
         th.read_csv(path, inputs="ventil", output="druck", delimiter=";", decimal_comma=True, comment="#")
     with pytest.raises(ValueError, match="name the output with output"):
         th.read_csv(path, delimiter=";", comment="#")
-    with pytest.raises(TypeError, match="unexpected keyword argument 'delimeter'"):
+    with pytest.raises(TypeError, match="did you mean 'delimiter'"):
         th.read_csv(path, delimeter=";")  # type: ignore[call-arg]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
@@ -37,7 +38,7 @@ def test_predictions_meet_the_free_run(motor: th.Log) -> None:
 
 
 def test_what_stands_before_a_log_has_one_set_of_words(motor: th.Log) -> None:
-    words = ["auto", "drop", "zero", "estimate"]
+    words: list[Any] = ["auto", "drop", "zero", "estimate"]
     # Without F there are no initial conditions to estimate.
     for word in words[:3]:
         th.armax(motor, 2, 2, 1, initial=word)

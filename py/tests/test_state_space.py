@@ -136,7 +136,7 @@ def test_options_are_those_of_the_command_line() -> None:
     calls: list[tuple[Callable[[], th.Model], str]] = [
         (lambda: th.ss(data, 0), "order"),
         (lambda: th.ss(data, past=0), "past"),
-        (lambda: th.ss(data, weighting="pem"), "weighting"),
+        (lambda: th.ss(data, weighting="pem"), "weighting"),  # type: ignore[arg-type]
         (lambda: th.ss(data, nk=[1, 2, 3]), "nk"),
         (lambda: th.ss(data, feedthrough=False, nk=0), "nk"),
     ]
@@ -178,7 +178,7 @@ def test_refined_models_have_standard_errors() -> None:
         assert np.all(step.standard_errors[1:] > 0)
         assert np.all(model.frequency_response([0.1, 1.0], output="y1").magnitude_errors > 0)
     with pytest.raises(ValueError, match="refine"):
-        th.ss(data, 2, refine="both")
+        th.ss(data, 2, refine="both")  # type: ignore[arg-type]
 
 
 def test_an_arx_model_has_several_outputs() -> None:
@@ -197,7 +197,7 @@ def test_an_arx_model_has_several_outputs() -> None:
     assert [apart["a"][lag][0][0]["value"] for lag in range(2)] == pytest.approx(alone.parameters[:2])
     assert apart["a"][0][0][1]["standard_error"] is None
     with pytest.raises(ValueError, match="couple"):
-        th.arx(data, 2, 2, couple="some")
+        th.arx(data, 2, 2, couple="some")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="couple"):
         th.arx(th.dc_motor(), 2, 2, couple="full")
     with pytest.raises(ValueError, match="prefilter"):

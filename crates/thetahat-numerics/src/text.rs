@@ -123,5 +123,39 @@ pub fn escaped_json(json: String) -> String {
     escaped
 }
 
+/// The name that differs least from a word, if one is near: at most a third of its characters have to be changed, and
+/// not all of them.
+///
+/// (Levenshtein 1966, by Wagner and Fischer's recursion of 1974.)
+fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let letters: Vec<char> = word.chars().take(100).flat_map(char::to_lowercase).collect();
+    let distance = |name: &str| {
+        let mut row: Vec<usize> = (0..=letters.len()).collect();
+        for (i, there) in name.chars().take(100).flat_map(char::to_lowercase).enumerate() {
+            let mut diagonal = std::mem::replace(&mut row[0], i + 1);
+            for (j, here) in letters.iter().enumerate() {
+                let changed = diagonal + usize::from(*here != there);
+                diagonal = row[j + 1];
+                row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
+            }
+        }
+        row[letters.len()]
+    };
+    let best = names.into_iter().map(|name| (distance(name), name)).min_by_key(|(distance, _)| *distance)?;
+    (best.0 <= letters.len().div_ceil(3) && best.0 < letters.len()).then_some(best.1)
+}
+
+/// "; did you mean 'x'?" where a name is near, or nothing.
+///
+/// ```
+/// use thetahat_numerics::text::suggestion;
+///
+/// assert_eq!(suggestion("detrned", ["detrend", "offset"]), "; did you mean 'detrend'?");
+/// assert_eq!(suggestion("gain", ["detrend", "offset"]), "");
+/// ```
+pub fn suggestion<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> String {
+    nearest(word, names).map_or(String::new(), |name| format!("; did you mean '{name}'?"))
+}
+
 #[cfg(test)]
 mod tests;

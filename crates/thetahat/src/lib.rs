@@ -71,6 +71,8 @@
 //! | [`step_test`] | what a course reads off the response to a step |
 //! | [`tune`](mod@tune) | PI and PID settings for a process, and the loop that they give |
 //! | [`control`](mod@control) | controllers for a model, and the loops that they give |
+//! | [`plan`] | the options of a fit as data: one table, and plans in JSON |
+//! | [`fit`] | from options to a model of any kind |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -93,9 +95,11 @@ mod document;
 pub mod estimate;
 pub mod export;
 pub mod filter;
+pub mod fit;
 pub mod inspect;
 pub mod model;
 pub mod optimize;
+pub mod plan;
 pub mod present;
 pub mod report;
 pub mod respond;

@@ -56,16 +56,15 @@ from thetahat._thetahat import (
 from thetahat.base.said import EstimationWarning
 from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat.controllers.tune import Tuning, tune
-from thetahat.engine.options import (
-    DesignOptions,
+from thetahat.engine.fit_options import (
     EquationsOptions,
     FitOptions,
+    ImpulseResponseOptions,
     NarxOptions,
-    ReadOptions,
-    SpectrumOptions,
-    StepTestOptions,
-    ValidationOptions,
+    ProcessOptions,
+    StateSpaceOptions,
 )
+from thetahat.engine.options import DesignOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
 from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
@@ -115,6 +114,7 @@ __all__ = [
     "Forgetting",
     "FrequencyResponse",
     "GreyBox",
+    "ImpulseResponseOptions",
     "Innovation",
     "Inspection",
     "KalmanFilter",
@@ -131,6 +131,7 @@ __all__ = [
     "NormalEquations",
     "ObserverTrajectory",
     "OutOfSequenceFilter",
+    "ProcessOptions",
     "ReadOptions",
     "RecursiveArmax",
     "RecursiveArx",
@@ -147,6 +148,7 @@ __all__ = [
     "StateFilter",
     "StateModel",
     "StateSpace",
+    "StateSpaceOptions",
     "StateTrajectory",
     "SteadyState",
     "StepTest",

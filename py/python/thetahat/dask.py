@@ -37,9 +37,9 @@ from dask.delayed import Delayed
 from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.engine import options as _options
-from thetahat.engine.options import EquationsOptions
+from thetahat.engine.fit_options import EquationsOptions
 from thetahat.fits import many as _many
-from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, general, oe, search, told, words
+from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, general, oe, search, told
 from thetahat.fits.grey_box import GreyBox, grey
 from thetahat.fits.normal_equations import NormalEquations as _NormalEquations
 from thetahat.fits.normal_equations import both_horizons
@@ -287,7 +287,7 @@ def fit_experiments(
     shares = _shares(runs, per_task)
     if fit is grey:
         return told(_equations(work, shares, bound.arguments), stacklevel=3)
-    own = words(fit.__name__, bound.arguments)
+    own = _options.plan({"model": fit.__name__, **{name: value for name, value in bound.arguments.items() if name != "log"}})
     held = dask.persist(*[dask.delayed(_experiments)(work, share, own) for share in shares])
     known = list(chain(*dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])))
     every = _together([(run[0][0], _thetahat.Experiments.from_json(text)) for run, (_, text) in zip(runs, known)])
@@ -324,7 +324,7 @@ def _equations(work: _many.Work, shares: Sequence[_Share], arguments: Mapping[st
     held = dask.persist(*[dask.delayed(_joined)(work, share) for share in shares])
     logs = list(chain(*dask.compute(*held)))
     counts = [len(log.experiments) for log in logs]
-    own = _options.words(EquationsOptions, arguments)
+    own = _options.plan({name: arguments.get(name) for name in EquationsOptions.__annotations__})
     log = Log.join(logs)._log
     return Model._of(_thetahat.fit_equations_distributed(log, box._model, own, counts, _asking(_equations_answers, held, shares, box)))
 
@@ -357,13 +357,13 @@ def _shares(runs: Sequence[_Run], per_task: int | None) -> list[_Share]:
     return [runs[first:last] for first, last in zip(cuts, cuts[1:])]
 
 
-def _experiments(work: _many.Work, share: _Share, own: Sequence[str]) -> list[tuple[Log, str]]:
+def _experiments(work: _many.Work, share: _Share, own: str) -> list[tuple[Log, str]]:
     """The experiments of each run as one log, and what is known of them."""
     with _shared():
         return [_described_run(work, run, own) for run in share]
 
 
-def _described_run(work: _many.Work, run: _Run, own: Sequence[str]) -> tuple[Log, str]:
+def _described_run(work: _many.Work, run: _Run, own: str) -> tuple[Log, str]:
     logs: list[Log] = []
     described = []
     for name, item in run:
@@ -400,12 +400,12 @@ def _described(part: Iterable[tuple[Log, str]], count: int) -> list[tuple[Log | 
     return [(log if count * len(log) < fetched else None, text) for log, text in part]
 
 
-def _deviations(part: Iterable[tuple[Any, str]], own: Sequence[str], offsets: Sequence[float]) -> list[Log]:
+def _deviations(part: Iterable[tuple[Any, str]], own: str, offsets: Sequence[float]) -> list[Log]:
     with _shared():
         return [Log._of(_thetahat.deviations(log._log, own, offsets), log._clock) for log, _ in part]
 
 
-def _answers(part: Iterable[Log], questions: Iterable[bytes], own: Sequence[str]) -> list[bytes]:
+def _answers(part: Iterable[Log], questions: Iterable[bytes], own: str) -> list[bytes]:
     with _shared():
         return [_thetahat.answer(log._log, own, question) for log, question in zip(part, questions)]
 

@@ -26,7 +26,7 @@ except ImportError as error:
     raise ImportError(message) from error
 
 from thetahat.base import clock as _clock, numbers as _numbers
-from thetahat.engine.options import NarxOptions
+from thetahat.engine.fit_options import NarxOptions
 from thetahat.fits.fit import arx
 from thetahat.fits.narx import narx
 from thetahat.fits.state_space import ss
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
-    from thetahat.engine.options import Band, Bound, Rows
+    from thetahat.engine.values import Band, Bound, Rows
 
 __all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor", "StateSpaceRegressor"]
 
@@ -71,6 +71,13 @@ _OPTIONS = (
     "dc_gain",
     "ridge",
     "noise_bound",
+    "search",
+    "max_iterations",
+    "tolerance",
+    "step",
+    "starts",
+    "seed",
+    "time_limit",
 )
 
 _STATES = (
@@ -351,7 +358,7 @@ class ARXRegressor(_Regressor):
     sample_time : float, default=None
         Seconds from one sample to the next. None: that of the times in the index of pandas that X or y has, else 1.
     estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
-    ridge, noise_bound : default=None
+    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit : default=None
         What to fit to and how, as for `thetahat.arx`, see `thetahat.FitOptions`. Channels are called as the columns of a data
         frame, else u, or u1, u2, …, and y.
 
@@ -417,6 +424,13 @@ class ARXRegressor(_Regressor):
         dc_gain: Bound | Mapping[str, Bound] | None = None,
         ridge: float | None = None,
         noise_bound: float | None = None,
+        search: str | None = None,
+        max_iterations: int | None = None,
+        tolerance: float | None = None,
+        step: float | tuple[float, float] | None = None,
+        starts: int | None = None,
+        seed: int | None = None,
+        time_limit: float | None = None,
     ) -> None:
         self.na = na
         self.nb = nb
@@ -439,6 +453,13 @@ class ARXRegressor(_Regressor):
         self.dc_gain = dc_gain
         self.ridge = ridge
         self.noise_bound = noise_bound
+        self.search = search
+        self.max_iterations = max_iterations
+        self.tolerance = tolerance
+        self.step = step
+        self.starts = starts
+        self.seed = seed
+        self.time_limit = time_limit
 
     def _fitted(self, log: Log) -> Model:
         orders = {"nb": _orders(self.nb), "nk": _orders(self.nk)} if log.inputs else {"nb": 0}

@@ -255,6 +255,7 @@ fn fit(
     let mut report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data,
         selection: None,
         decisions: Vec::new(),

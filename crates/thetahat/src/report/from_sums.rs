@@ -32,6 +32,7 @@ pub(super) fn report_of(
     let mut report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data,
         selection: None,
         decisions: Vec::new(),

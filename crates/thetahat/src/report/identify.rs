@@ -287,6 +287,7 @@ fn fit(
     let mut report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data: Data {
             logs: sources.to_vec(),
             digests,

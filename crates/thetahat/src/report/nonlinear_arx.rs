@@ -111,6 +111,7 @@ pub(super) fn reported(
     let report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data,
         selection: None,
         decisions: Vec::new(),

@@ -7,6 +7,7 @@ use super::warnings::{at_the_stability_boundary, unstable_plant};
 use crate::Error;
 use crate::data::{Log, Offset};
 use crate::model::{PolynomialModel, StateSpaceModel};
+use crate::plan::FitOptions;
 use crate::respond::PolynomialOnLog;
 use crate::respond::state_space::StateSpaceOnLog;
 use crate::select::{Focus, Grid};
@@ -65,6 +66,17 @@ impl PendingEvaluation {
     /// The figures are there.
     pub(super) fn done(report: Report) -> Self {
         Self { report: report.with_purpose(), open: None }
+    }
+
+    /// The figures are there, in a report of any kind of model.
+    pub(crate) fn of(report: Report) -> Self {
+        Self { report, open: None }
+    }
+
+    /// The same with the options that it was made of in the report.
+    pub(crate) fn with_plan(mut self, options: &FitOptions) -> Self {
+        self.report.plan = Some(options.clone());
+        self
     }
 
     /// The report so far: without figures of how well the model fits, and what they give reason to warn of.

@@ -286,6 +286,7 @@ pub fn fit_process(
     let mut report = Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data,
         selection: None,
         decisions,

@@ -7,6 +7,7 @@ use crate::data::{Decision, Prefilter, Rows, Source};
 use crate::document::document_methods;
 use crate::estimate::{Criteria, Initial, Procedure};
 use crate::model::{Model, Quantity};
+use crate::plan::FitOptions;
 use crate::select::Selection;
 use crate::validate::{Fit, Part};
 use crate::{Document, Error, text};
@@ -20,6 +21,9 @@ pub struct Report {
     pub schema: String,
     /// The program and version that wrote it.
     pub generator: String,
+    /// The options of the fit, with which it can be repeated; none where it was not made of any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<FitOptions>,
     /// What the model was fitted to.
     pub data: Data,
     /// How the model was chosen among others, if it was.

@@ -1,244 +1,24 @@
-"""Keyword arguments as the options of the command line, whose words they share."""
+"""Keyword arguments as options: of a fit as a plan, of other verbs in the words of the command line."""
 
 from __future__ import annotations
 
 import contextlib
 import datetime
+import difflib
+import functools
+import inspect
+import json
 import math
 import operator
 import os
 from collections.abc import Mapping, Sequence
 from statistics import NormalDist
-from typing import Any, Optional, TypedDict, Union
+from typing import Any, Callable, Literal, Optional, TypedDict, TypeVar, Union, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thetahat.engine import files as _files
-
-Order = Union[int, range]
-"""An order, or the orders among which to choose: ``range(1, 9)`` is 1 to 8."""
-
-Orders = Union[Order, Sequence[Order]]
-"""An order for all inputs, or one for each."""
-
-Rows = Union[str, slice, range, Sequence[Union[str, slice, range]]]
-"""Rows of a log: a slice or a range as Python counts them, or ``"1..500"``, which counts from 1 and holds both ends."""
-
-Bound = Union[float, tuple[Optional[float], Optional[float]]]
-"""A value, or the lower and the upper end of a range, either of which may be None."""
-
-
-Duration = Union[float, datetime.timedelta, "np.timedelta64"]
-"""Seconds, or a timedelta of Python, NumPy or pandas."""
-
-Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
-"""The time between the new rows, "linear", "hold" or "auto", and "unfiltered" where no filter is wanted."""
-
-
-Band = Union["tuple[float | None, float | None]", str]
-"""The lower and the upper end in Hz, either of which may be None; or a text such as "0.1..5"."""
-
-Frequencies = Union["tuple[float, float]", Sequence[float], NDArray[np.float64]]
-"""A band in radians per second as a tuple of its ends, or a list of frequencies."""
-
-
-class FitOptions(TypedDict, total=False):
-    """What every fit can be told, beside the orders.
-
-    Attributes
-    ----------
-    estimate, validate : rows
-        The rows to fit to (all, unless said otherwise), and those to validate on: ``slice(0, 500)`` as Python counts, or
-        ``"1..500"``, which counts from 1 and holds both ends; or a list of these.
-    split : (float, float, float)
-        Cuts the rows in time order into parts to fit, to choose and to test, such as ``(60, 20, 20)``.
-    detrend : {"mean", "linear", "none", "start:K"}
-        What is taken from each channel before the fit and kept in the model.
-    offset : dict of str to float
-        Offsets of channels that are set by hand.
-    prefilter : (float or None, float or None) or str
-        The band of frequencies in Hz whose errors the fit makes small, such as ``(0.1, 5)``: inputs and output go through one
-        Butterworth filter. The model and its figures are of the signals as they are.
-    initial : {"auto", "drop", "zero", "estimate"}
-        What stands for the samples before the first of a segment. Rows that the log has before those to fit to are used as
-        past inputs and outputs in all cases but "zero". Without them, "drop" leaves out the first rows, for models without F;
-        "estimate" finds what they did to B/F u with the parameters, for models with F. "auto" is "drop" without F; with F it
-        is "estimate" where there is a past or where that is worth its parameters, else "zero".
-    likelihood : {"conditional", "exact"}
-        Which likelihood is made large: that given the first samples, which least squared errors do, or that of all measured
-        outputs, by the Kalman filter, through missing ones, as statsmodels' SARIMAX counts it. For models without D and F, one at
-        a time. With "exact" the response to the inputs begins at rest (``initial="zero"``) or in a state that is estimated
-        ("estimate"); "auto" takes the latter where rows stand before, or where it is worth its parameters.
-    constant : {"auto", "yes", "no"}
-        Whether the level of the output is estimated with the parameters, beside the mean that is taken off: where it lowers
-        MDL, always or never. With ``detrend="none"``, or an offset of the output by hand, "auto" is "no". It is part of ``model.offsets``, and stands with its standard error in the report.
-    trend : bool
-        Whether a slope of the output is estimated with the parameters too, and its level with it.
-    focus : {"auto", "prediction", "simulation"} or int
-        What the model is for: errors one step ahead, free runs that the inputs alone drive, or a number of steps ahead. With
-        orders, "simulation" finds the plant with the least errors of its free run and the noise behind it, and a number
-        is the horizon of the figure on held-out rows. In a choice it says what models are compared by on rows that were held
-        out from them; "auto" is "prediction", unless without orders another model simulates these clearly better.
-    norm : {2, 1, "huber", "huber:K", "inf"}
-        What to make small: squared errors; absolute ones, which wild samples do not rule; squares up to K times the scale of
-        the errors and absolute values beyond (1.345); or, where the model is linear in its parameters, the largest error.
-    bound : dict of str to float or (float, float)
-        Ranges or values that parameters keep to, such as ``{"a1": (-1.9, 0)}``.
-    dc_gain : float, (float, float) or dict
-        A range or value of the static gain; of each input by its name.
-    ridge : float
-        Keeps parameters small: weighs like this many more samples in which the output is 0.
-    noise_bound : float
-        Let no error exceed this, in units of the output.
-    search : {"lm", "gauss-newton", "newton", "gradient", "annealing"}
-        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise. This and what follows is for models that
-        need a search: those with C, D or F.
-    max_iterations : int
-        Iterations at most, from each start: 100.
-    tolerance : float
-        Stop where the next step would lower the cost by less than this fraction: 1e-8.
-    step : float or (float, float)
-        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
-    starts : int
-        Search from this many further starts.
-    seed : int
-        Which random starts.
-    time_limit : float
-        After this many seconds begin no iteration, and look for no further start.
-    """
-
-    estimate: Rows
-    validate: Rows
-    split: tuple[float, float, float]
-    detrend: str
-    offset: Mapping[str, float]
-    prefilter: Band
-    initial: str
-    likelihood: str
-    constant: str
-    trend: bool
-    focus: Union[str, int]
-    norm: Union[float, str]
-    bound: Mapping[str, Bound]
-    dc_gain: Union[Bound, Mapping[str, Bound]]
-    ridge: float
-    noise_bound: float
-    search: str
-    max_iterations: int
-    tolerance: float
-    step: Union[float, tuple[float, float]]
-    starts: int
-    seed: int
-    time_limit: float
-
-
-class EquationsOptions(TypedDict, total=False):
-    """What a fit of a model in equations can be told.
-
-    Attributes
-    ----------
-    estimate, validate, split
-        Rows to fit to and to validate on, see `FitOptions`. In each log the model begins, as it says, with the first row to fit to.
-    search : {"lm", "gauss-newton", "newton", "gradient", "annealing"}
-        How steps are chosen: Levenberg and Marquardt's way, unless said otherwise.
-    max_iterations : int
-        Iterations at most, from each start: 100.
-    tolerance : float
-        Stop where the next step would raise the log-likelihood by no more than this fraction of half the measured values: 1e-8.
-    step : float or (float, float)
-        Step length of the gradient search: c1, or c1/(c2 + l) in iteration l.
-    starts : int
-        Search from this many further starts, drawn from what the model knows of its parameters.
-    seed : int
-        Which random starts.
-    time_limit : float
-        After this many seconds begin no iteration.
-    """
-
-    estimate: Rows
-    validate: Rows
-    split: tuple[float, float, float]
-    search: str
-    max_iterations: int
-    tolerance: float
-    step: Union[float, tuple[float, float]]
-    starts: int
-    seed: int
-    time_limit: float
-
-
-class NarxOptions(TypedDict, total=False):
-    """What a fit of a nonlinear ARX model can be told.
-
-    Attributes
-    ----------
-    estimate, validate, split, detrend, offset, ridge
-        What to fit to, what to judge on and what is taken from the channels, see `FitOptions`.
-    regressors : sequence of str
-        Expressions of the channels that g reads too, such as ``"sqrt(u)"``, at the lags of the channels in them.
-    degree : int
-        Factors of a product at most, for ``"poly"``: 2.
-    terms : int, or sequence of str
-        How many functions to take; chosen unless it is said. Or products by name, as `Model.parameter_names` has them: ``["1",
-        "y(k-1)", "y(k-1)^2*u(k-1)"]``.
-    most_terms : int
-        How many functions a choice looks at: 40.
-    select : str
-        What makes one number of functions better than another: ``"validation"``, the free run on the validation rows, where there are
-        some, else ``"cv"``, that on five blocks of the estimation rows; or an information criterion, such as ``"mdl"``.
-    centres : str
-        Where radial basis functions stand: ``"chosen"`` among the samples, ``"kmeans:N"``, ``"grid:N"`` or ``"random:N"``.
-    width : float
-        sigma of exp(-|z - centre|^2/sigma^2), z in standard deviations; so that neighbours overlap, unless it is said.
-    units : int
-        Units of a network, for ``"tanh"``, ``"logistic"`` and ``"relu"``, centres for ``"rbf-free"``, local models for ``"local"``, or
-        neighbours for ``"knn"``; chosen unless it is said. Bends of each regressor, for ``"spline"``: 5. Units that are drawn: 100.
-    drawn : bool
-        Draw the weights of the hidden layer of a network, and choose among its units; else all weights are trained. Those of ``"step"``
-        are always drawn.
-    focus : {"auto", "prediction", "simulation"} or int
-        Of which errors parameters are made the least: one step ahead, of the free run, or so many steps from what was measured.
-        ``"auto"`` is one step ahead, and for what is trained the free run where there are inputs.
-    search, max_iterations, tolerance, step, starts, time_limit
-        How a training searches, see `FitOptions`: 500 iterations and 4 further starts unless it is said.
-    linear : bool
-        Whether a constant and the regressors themselves stand beside radial basis functions; whether local models, and what neighbours
-        say, are planes: True.
-    membership : {"gaussian", "trapezoid", "rectangle"}
-        How local models share the space of the regressors.
-    raw_terms : bool
-        Leave signals in their own units: else each is divided by its standard deviation.
-    seed : int
-        Which random centres, units and starts.
-    """
-
-    estimate: Rows
-    validate: Rows
-    split: tuple[float, float, float]
-    detrend: str
-    offset: Mapping[str, float]
-    ridge: float
-    regressors: Sequence[str]
-    degree: int
-    terms: Union[int, Sequence[str]]
-    most_terms: int
-    select: str
-    centres: str
-    width: float
-    units: int
-    linear: bool
-    membership: str
-    raw_terms: bool
-    drawn: bool
-    focus: Union[str, int]
-    search: str
-    max_iterations: int
-    tolerance: float
-    step: Union[float, tuple[float, float]]
-    starts: int
-    seed: int
-    time_limit: float
+from thetahat.engine.values import Duration, Frequencies, Orders, Resample, Rows
 
 
 class ValidationOptions(TypedDict, total=False):
@@ -260,12 +40,12 @@ class ValidationOptions(TypedDict, total=False):
         The levels of Anderson's test.
     """
 
-    rows: Rows
-    detrend: str
-    horizon: Union[int, Sequence[int]]
-    lags: int
-    alpha: float
-    alphas: Sequence[float]
+    rows: Optional[Rows]
+    detrend: Optional[Union[Literal["model", "none", "mean", "linear"], str]]
+    horizon: Optional[Union[int, Sequence[int]]]
+    lags: Optional[int]
+    alpha: Optional[float]
+    alphas: Optional[Sequence[float]]
 
 
 class SpectrumOptions(TypedDict, total=False):
@@ -296,17 +76,17 @@ class SpectrumOptions(TypedDict, total=False):
         For "sines": rows of a period, and how many periods to leave out at the beginning.
     """
 
-    rows: Rows
-    detrend: str
-    method: str
-    frequencies: Frequencies
-    points: int
-    half_width: int
-    lags: int
-    window: int
-    estimator: str
-    period: int
-    discard: int
+    rows: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "none", "linear"], str]]
+    method: Optional[Literal["lpm", "spa", "welch", "etfe", "sines"]]
+    frequencies: Optional[Frequencies]
+    points: Optional[int]
+    half_width: Optional[int]
+    lags: Optional[int]
+    window: Optional[int]
+    estimator: Optional[Literal["h1", "h2"]]
+    period: Optional[int]
+    discard: Optional[int]
 
 
 class StepTestOptions(TypedDict, total=False):
@@ -318,7 +98,7 @@ class StepTestOptions(TypedDict, total=False):
         The rows to use; all, unless said otherwise. Each range is for itself.
     """
 
-    rows: Rows
+    rows: Optional[Rows]
 
 
 class DesignOptions(TypedDict, total=False):
@@ -349,15 +129,15 @@ class DesignOptions(TypedDict, total=False):
         Which random signal, or where a PRBS begins.
     """
 
-    length: int
-    range: tuple[float, float]
-    rms: float
-    band: tuple[float, float]
-    points: int
-    period: int
-    channels: int
-    sample_time: Duration
-    seed: int
+    length: Optional[int]
+    range: Optional[tuple[float, float]]
+    rms: Optional[float]
+    band: Optional[tuple[float, float]]
+    points: Optional[int]
+    period: Optional[int]
+    channels: Optional[int]
+    sample_time: Optional[Duration]
+    seed: Optional[int]
 
 
 class ReadOptions(TypedDict, total=False):
@@ -397,21 +177,21 @@ class ReadOptions(TypedDict, total=False):
         Words that stand for numbers, such as {"auto": 1}, besides words for off and on.
     """
 
-    time: str
-    sample_time: Duration
-    resample: Resample
-    time_format: str
-    time_unit: str
-    time_zone: str
-    delimiter: str
-    comment: str
-    encoding: str
-    sheet: str
-    decimal_comma: bool
-    header: Union[bool, int]
-    skip_rows: int
-    missing: Union[str, Sequence[str]]
-    values: Mapping[str, float]
+    time: Optional[str]
+    sample_time: Optional[Duration]
+    resample: Optional[Resample]
+    time_format: Optional[str]
+    time_unit: Optional[Literal["ns", "us", "ms", "s", "min", "h", "d"]]
+    time_zone: Optional[str]
+    delimiter: Optional[str]
+    comment: Optional[str]
+    encoding: Optional[str]
+    sheet: Optional[str]
+    decimal_comma: Optional[bool]
+    header: Optional[Union[bool, int]]
+    skip_rows: Optional[int]
+    missing: Optional[Union[str, Sequence[str]]]
+    values: Optional[Mapping[str, float]]
 
 
 def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
@@ -438,44 +218,102 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
                 found.append(f"--header-row={integer(name, value)}")
         elif name == "decimal_comma":
             found.append(f"--decimal-comma={'yes' if flag(name, value) else 'no'}")
-        elif name == "linear":
-            found += [] if flag(name, value) else ["--no-linear"]
-        elif name == "terms" and isinstance(value, (list, tuple)):
-            # The products themselves.
-            if not value:
-                raise ValueError("terms: there is none; name one at least")
-            found += [f"--term={text(name, one)}" for one in value]
-        elif name == "regressors":
-            if not isinstance(value, (list, tuple)):
-                raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
-            found += [f"--regressor={text(name, one)}" for one in value]
         elif name == "values":
             found += [f"--value={one}" for one in _texts(name, value, rows)]
-        elif name in ("trend", "raw_terms", "drawn"):
-            found += [f"--{name.replace('_', '-')}"] if flag(name, value) else []
         else:
             found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
     return found
 
 
-def order_words(**orders: Orders | None) -> list[str]:
-    """Orders as options: values or ranges, one for all inputs or one for each."""
-    found = []
-    for name, value in orders.items():
+def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
+    """Options of a fit as a plan, in JSON; those that are None were not given. ``rows`` is where an open slice ends.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As for `words`.
+    """
+    found: dict[str, Any] = {}
+    for name, value in arguments.items():
         if value is None:
             continue
-        if isinstance(value, np.ndarray):
-            value = value.tolist()
-        if isinstance(value, (list, tuple)):
-            if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
-                raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
-            texts = [_order(name, one) for one in value]
-            if not texts:
-                raise ValueError(f"{name}: there is none; give one for each channel")
-            found.append(f"--{name}={','.join(texts)}")
+        if name == "linear":
+            found["no_linear"] = not flag(name, value)
+        elif name == "terms" and isinstance(value, (list, tuple)):
+            # The products themselves.
+            if not value:
+                raise ValueError("terms: there is none; name one at least")
+            found["term"] = [text(name, one) for one in value]
+        elif name == "regressors":
+            if not isinstance(value, (list, tuple)):
+                raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
+            found["regressor"] = [text(name, one) for one in value] or None
+        elif name == "feedthrough":
+            found[name] = "yes" if flag(name, value) else "no"
+        elif name in ("trend", "raw_terms", "drawn", "delay"):
+            found[name] = flag(name, value)
+        elif name in ("past", "future"):
+            found[name] = count(name, value)
         else:
-            found.append(f"--{name}={_order(name, value)}")
-    return found
+            texts = _orders(name, value) if name in _ORDERS else _texts(name, value, rows)
+            found[name] = texts[0] if len(texts) == 1 else texts or None
+    return json.dumps(found)
+
+
+_ORDERS = frozenset(["na", "nb", "nc", "nd", "nf", "nk", "np", "nu", "ny", "nz", "order", "taps"])
+"""The options that are orders: values or ranges, one for all channels or one for each."""
+
+
+def _orders(name: str, value: Any) -> list[str]:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if not isinstance(value, (list, tuple)):
+        return [_order(name, value)]
+    if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
+        raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
+    texts = [_order(name, one) for one in value]
+    if not texts:
+        raise ValueError(f"{name}: there is none; give one for each channel")
+    return [",".join(texts)]
+
+
+def order_words(**orders: Orders | None) -> list[str]:
+    """Orders in the words of the command line."""
+    return [f"--{name}={','.join(_orders(name, value))}" for name, value in orders.items() if value is not None]
+
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+
+
+def takes(options: type | None = None) -> Callable[[_F], _F]:
+    """A function whose keyword arguments are these options beside its own parameters: `inspect.signature` and `help` show each,
+    and one that is none is an error that says which may have been meant."""
+    types: dict[str, Any] = {} if options is None else options.__annotations__
+
+    def documented(function: _F) -> _F:
+        signature = inspect.signature(function)
+        own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
+        added = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+            for name, kind in types.items()
+        ]
+        known = signature.replace(parameters=[*own, *added])
+
+        @functools.wraps(function)
+        def checked(*arguments: Any, **named: Any) -> Any:
+            for name in named:
+                if name not in known.parameters:
+                    near = difflib.get_close_matches(name, known.parameters, n=1)
+                    meant = f"; did you mean {near[0]!r}?" if near else ""
+                    raise TypeError(f"{function.__name__}() has no argument {name!r}{meant}")
+            return function(*arguments, **named)
+
+        own_types = {name: kind for name, kind in function.__annotations__.items() if name != "options"}
+        checked.__annotations__ = {**own_types, **types}
+        checked.__signature__ = known  # type: ignore[attr-defined]
+        return cast(_F, checked)
+
+    return documented
 
 
 def _order(name: str, value: Any) -> str:

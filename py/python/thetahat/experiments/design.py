@@ -12,7 +12,8 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import DesignOptions, Duration
+from thetahat.engine.options import DesignOptions
+from thetahat.engine.values import Duration
 from thetahat.models.model import Model
 
 Array = npt.NDArray[np.float64]
@@ -126,6 +127,7 @@ def design(
     sample_time: Duration | None = None,
     seed: int | None = None,
 ) -> ExperimentDesign: ...
+@_options.takes()
 def design(
     signal: str | Sequence[str] | None = None,
     *,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,13 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import Frequencies, Rows, SpectrumOptions
+from thetahat.engine.options import SpectrumOptions
 from thetahat.logs.log import Log, handle
 from thetahat.models import convert as _convert
 from thetahat.models.responses import FrequencyResponse
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Array = NDArray[np.float64]
 
@@ -162,20 +165,10 @@ class MeasuredResponse(Document):
         return f"MeasuredResponse({self.method['name']}, {count} frequencies, {', '.join(self.inputs)})"
 
 
+@_options.takes(SpectrumOptions)
 def spectrum(
     log: Log,
-    *,
-    method: str | None = None,
-    frequencies: Frequencies | None = None,
-    points: int | None = None,
-    half_width: int | None = None,
-    lags: int | None = None,
-    window: int | None = None,
-    estimator: str | None = None,
-    period: int | None = None,
-    discard: int | None = None,
-    rows: Rows | None = None,
-    detrend: str | None = None,
+    **options: Unpack[SpectrumOptions],
 ) -> MeasuredResponse:
     """Estimate the frequency response from the inputs of a log to its output, without a model.
 
@@ -210,5 +203,5 @@ def spectrum(
     >>> th.spectrum(log, frequencies=(1, 300), points=50)
     MeasuredResponse(lpm, 50 frequencies, u)
     """
-    words = _options.words(SpectrumOptions, locals(), len(log) if isinstance(log, Log) else None)
+    words = _options.words(SpectrumOptions, options, len(log) if isinstance(log, Log) else None)
     return MeasuredResponse(*_thetahat.spectrum(handle("log", log), words))

@@ -8,7 +8,8 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import Rows, StepTestOptions
+from thetahat.engine.options import StepTestOptions
+from thetahat.engine.values import Rows
 from thetahat.experiments.spectrum import Array, MeasuredResponse
 from thetahat.logs.log import Log, handle
 
@@ -107,6 +108,7 @@ class StepTest(Document):
         return f"StepTest({count} step{'s' if count > 1 else ''} of {self.input}, {shapes})"
 
 
+@_options.takes()
 def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: str | None = None) -> StepTest:
     """Read off the responses to the steps of a log what a course does, with the standard error of each way.
 

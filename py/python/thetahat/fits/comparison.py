@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from thetahat import _thetahat
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import Rows, ValidationOptions
+from thetahat.engine.options import ValidationOptions
 from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class Comparison(Document):
@@ -26,17 +30,13 @@ class Comparison(Document):
         return f"Comparison({', '.join(str(model['report']) for model in self.document['models'])})"
 
 
+@_options.takes(ValidationOptions)
 def compare(
     models: Mapping[str, Model] | Sequence[Model],
     log: Log,
     *,
-    rows: Rows | None = None,
-    detrend: str | None = None,
-    horizon: int | Sequence[int] | None = None,
-    lags: int | None = None,
-    alpha: float | None = None,
-    alphas: Sequence[float] | None = None,
     over: MeasuredResponse | None = None,
+    **options: Unpack[ValidationOptions],
 ) -> Comparison:
     """Put several fitted models side by side on a log.
 
@@ -63,7 +63,7 @@ def compare(
     >>> th.compare(models, log[700:])
     Comparison(arx, oe)
     """
-    words = _options.words(ValidationOptions, locals(), len(log) if isinstance(log, Log) else None)
+    words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
     named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
     if not named:
         raise ValueError("models: there is none; give at least one")

@@ -2,41 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.options import Band, Bound, FitOptions, Order, Orders, Rows
+from thetahat.engine.fit_options import FitOptions, ImpulseResponseOptions
+from thetahat.engine.values import Order, Orders
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@_options.takes(FitOptions)
 def arx(
     log: Log,
     na: Order,
     nb: Orders,
     nk: Orders = 1,
     *,
-    couple: str | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
+    couple: Literal["full", "none", "auto"] | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit an ARX model, A(q) y(t) = B(q) u(t) + e(t), by least squares.
 
@@ -56,8 +47,7 @@ def arx(
     couple : {"full", "none", "auto"}, optional
         With several outputs: whether an output depends on the past of all or of its own. "auto", which is taken unless it is said: what
         has the least MDL.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
-    ridge, noise_bound
+    **options
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -104,46 +94,17 @@ def arx(
     >>> [round(found.dc_gain(output=name)[0]) for name in found.outputs]
     [5, 3]
     """
-    if isinstance(log, Log) and len(log.outputs) > 1:
-        options = {name: value for name, value in locals().items() if name not in ("na", "nb", "nk")}
-        coupling = [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
-        words = ["--model=arx", *_options.order_words(na=na, nb=nb, nk=nk), *coupling]
-        words += _options.words(FitOptions, options, len(log))
-        found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
-        for warning in found._model.warnings():
-            _said.warn(warning, EstimationWarning, stacklevel=2)
-        return found
-    if couple is not None:
-        raise ValueError("couple: it is for logs with several outputs; leave it out")
-    return _fit("arx", locals())
+    return fitted(log, {"model": "arx", "na": na, "nb": nb, "nk": nk, "couple": couple}, options)
 
 
+@_options.takes(FitOptions)
 def armax(
     log: Log,
     na: int,
     nb: Orders,
     nc: int,
     nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit an ARMAX model, A(q) y(t) = B(q) u(t) + C(q) e(t), by prediction errors.
 
@@ -155,8 +116,7 @@ def armax(
         Coefficients of A, B and C; nb may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, search,
-    max_iterations, tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -175,33 +135,16 @@ def armax(
     >>> model.c.round(3)
     array([ 1.   , -0.628])
     """
-    return _fit("armax", locals())
+    return fitted(log, {"model": "armax", "na": na, "nb": nb, "nc": nc, "nk": nk}, options)
 
 
+@_options.takes(FitOptions)
 def oe(
     log: Log,
     nb: Orders,
     nf: Orders,
     nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit an output error model, y(t) = B(q)/F(q) u(t) + e(t), by prediction errors.
 
@@ -215,8 +158,7 @@ def oe(
         Coefficients of B and F.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
-    step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -234,9 +176,10 @@ def oe(
     >>> th.oe(th.dc_motor(), nb=2, nf=2).structure
     'oe'
     """
-    return _fit("oe", locals())
+    return fitted(log, {"model": "oe", "nb": nb, "nf": nf, "nk": nk}, options)
 
 
+@_options.takes(FitOptions)
 def bj(
     log: Log,
     nb: Orders,
@@ -244,25 +187,7 @@ def bj(
     nd: int,
     nf: Orders,
     nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit a Box-Jenkins model, y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
@@ -274,8 +199,7 @@ def bj(
         Coefficients of B, C, D and F; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, norm, search, max_iterations, tolerance,
-    step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -294,28 +218,14 @@ def bj(
     >>> abs(model.poles()).round(2)
     array([0.89, 0.69])
     """
-    return _fit("bj", locals())
+    return fitted(log, {"model": "bj", "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
 
 
+@_options.takes(FitOptions)
 def ar(
     log: Log,
     na: int,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit an autoregressive model of a time series, A(q) y(t) = e(t); inputs of the log are left out.
 
@@ -325,8 +235,7 @@ def ar(
         The data.
     na : int
         Coefficients of A.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, bound, dc_gain, ridge,
-    noise_bound
+    **options
         What to fit to and how, see `thetahat.FitOptions`.
 
     Returns
@@ -346,32 +255,15 @@ def ar(
     >>> bool(np.isclose(th.ar(th.Log(y), na=2, detrend="none").a[1], -1.8 * np.cos(0.3)))
     True
     """
-    return _fit("ar", locals())
+    return fitted(log, {"model": "ar", "na": na}, options)
 
 
+@_options.takes(FitOptions)
 def arma(
     log: Log,
     na: int,
     nc: int,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    norm: float | str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit an ARMA model of a time series, A(q) y(t) = C(q) e(t); inputs of the log are left out.
 
@@ -381,8 +273,7 @@ def arma(
         The data.
     na, nc : int
         Coefficients of A and C.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, norm, search, max_iterations,
-    tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -409,9 +300,10 @@ def arma(
     >>> model.method, model.samples
     ('exact-likelihood', 750)
     """
-    return _fit("arma", locals())
+    return fitted(log, {"model": "arma", "na": na, "nc": nc}, options)
 
 
+@_options.takes(FitOptions)
 def general(
     log: Log,
     na: int = 0,
@@ -420,30 +312,7 @@ def general(
     nd: int = 0,
     nf: Orders | None = None,
     nk: Orders | None = None,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit the general model, A(q) y(t) = B(q)/F(q) u(t) + C(q)/D(q) e(t), by prediction errors.
 
@@ -455,8 +324,7 @@ def general(
         Coefficients of the polynomials; nb and nf may be one for each input.
     nk : int, or one for each input
         Samples from input to first effect: 1, unless said otherwise.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
-    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -474,23 +342,16 @@ def general(
     >>> th.general(th.dc_motor(), na=1, nb=2, nf=1, nd=1).structure
     'general'
     """
-    return _fit("general", locals())
+    return fitted(log, {"model": "general", "na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}, options)
 
 
+@_options.takes(ImpulseResponseOptions)
 def fir(
     log: Log,
     taps: int | Sequence[int],
-    kernel: str | None = "dc",
+    kernel: Literal["dc", "tc"] | None = "dc",
     nk: Orders = 0,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
+    **options: Unpack[ImpulseResponseOptions],
 ) -> Model:
     """Fit an impulse response, y(t) = g(0) u(t - nk) + g(1) u(t - nk - 1) + ... + e(t), by regularised least squares.
 
@@ -505,7 +366,7 @@ def fir(
         ("dc"), or one for both ("tc"), which the likelihood says. None is least squares.
     nk : int, or one for each input, default 0
         Samples from input to first effect.
-    estimate, validate, split, detrend, offset, initial, constant, trend
+    **options
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -531,28 +392,19 @@ def fir(
     >>> len(model.parameters)
     30
     """
-    words = _options.order_words(taps=taps)
-    words.append(f"--kernel={'none' if kernel is None else _options.text('kernel', kernel)}")
-    return _fit("fir", locals(), *words)
+    own = {"model": "fir", "taps": taps, "kernel": "none" if kernel is None else kernel, "nk": nk}
+    return fitted(log, own, options)
 
 
+@_options.takes(FitOptions)
 def fit(
     log: Log,
     *,
-    narx: str | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    time_limit: float | None = None,
+    narx: Literal["none"] | None = None,
+    plan: Model | Mapping[str, Any] | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
-    """Fit the model that the data ask for.
+    """Fit the model that the data ask for, or the one that a plan says.
 
     Delay, structure and orders are chosen. A step test may come to a process in continuous time (see `process`), so may a level that follows
     the sum of its input; a plant of many modes to a model in state space (see `ss`), one that is far from linear to a nonlinear ARX model
@@ -564,7 +416,10 @@ def fit(
         The data.
     narx : {"none"}, optional
         No nonlinear model.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend, focus, time_limit
+    plan : Model or dict, optional
+        Repeat the fit of this model, of any kind but one in equations: its `Model.plan`, or such a dict. Options that are given beside it
+        come in the place of its own.
+    **options
         What to fit to and what the model is for, see `thetahat.FitOptions`.
 
     Returns
@@ -582,20 +437,32 @@ def fit(
     >>> import thetahat as th
     >>> th.fit(th.dc_motor()).kind
     'polynomial'
+    >>> model = th.oe(th.dc_motor(), nb=2, nf=2)
+    >>> model.plan
+    {'input': ['u'], 'output': ['y'], 'model': 'oe', 'nb': [2], 'nf': [2], 'nk': [1]}
+    >>> th.fit(th.dc_motor(), plan=model) == model
+    True
     """
-    more = [] if narx is None else [f"--narx={_options.text('narx', narx)}"]
+    if plan is not None:
+        known = plan.plan if isinstance(plan, Model) else dict(plan)
+        if known is None:
+            raise ValueError("plan: the document of this model has none; fit it again")
+        chosen = log.select(inputs=known.pop("input", None), output=known.pop("output", None))
+        given = json.loads(_options.plan({"narx": narx, **options}, len(log)))
+        return told(Model._of(_thetahat.fit(handle("log", chosen), json.dumps({**known, **given}))), stacklevel=4)
     if isinstance(log, Log) and len(log.outputs) > 1 and not log.inputs:
         *others, last = log.outputs
         raise ValueError(
             f"log: {', '.join(others)} and {last} are all outputs, and there is no input; give the inputs apart, as "
             f"Log(frame[{last!r}], frame[{others!r}])"
         )
-    return _fit(None, locals(), *more)
+    return fitted(log, {"narx": narx}, options)
 
 
+@_options.takes(FitOptions)
 def search(
     log: Log,
-    model: str | None = None,
+    model: Literal["arx", "armax", "oe", "bj", "ar", "arma", "general"] | None = None,
     *,
     na: Orders | None = None,
     nb: Orders | None = None,
@@ -604,30 +471,8 @@ def search(
     nf: Orders | None = None,
     nk: Orders | None = None,
     select: str | None = None,
-    path: str | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    likelihood: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
-    focus: str | int | None = None,
-    norm: float | str | None = None,
-    bound: Mapping[str, Bound] | None = None,
-    dc_gain: Bound | Mapping[str, Bound] | None = None,
-    ridge: float | None = None,
-    noise_bound: float | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    path: Literal["all", "alternate"] | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
 
@@ -645,8 +490,7 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
-    estimate, validate, split, detrend, offset, prefilter, initial, likelihood, constant, trend, focus, norm, bound, dc_gain,
-    ridge, noise_bound, search, max_iterations, tolerance, step, starts, seed, time_limit
+    **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
     Returns
@@ -666,26 +510,18 @@ def search(
     >>> model.selection["models"]
     17
     """
-    more = [f"--{name}={_options.text(name, value)}" for name, value in (("select", select), ("path", path)) if value is not None]
-    return _fit(model, locals(), *more)
+    own = {"model": model, "na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk, "select": select, "path": path}
+    return fitted(log, own, options)
 
 
-def _fit(model: str | None, arguments: dict[str, Any], *more: str) -> Model:
-    """A fit by one of the functions above, with its arguments: the log, orders and options."""
-    log = arguments["log"]
+def fitted(log: Log, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
+    """A fit by one of the functions that users call: with its own arguments and its options."""
     data = handle("log", log)
-    return told(Model._of(_thetahat.fit(data, [*words(model, arguments, len(log)), *more])), stacklevel=4)
+    return told(Model._of(_thetahat.fit(data, _options.plan({**own, **options}, len(log)))), stacklevel=5)
 
 
-def words(model: str | None, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
-    """Orders and options of one of the functions above as those of the command line."""
-    orders = {name: arguments[name] for name in ("na", "nb", "nc", "nd", "nf", "nk") if name in arguments}
-    named = [] if model is None else [f"--model={_options.text('model', model)}"]
-    return [*named, *_options.order_words(**orders), *_options.words(FitOptions, arguments, rows)]
-
-
-def told(fitted: Model, stacklevel: int) -> Model:
+def told(model: Model, stacklevel: int) -> Model:
     """A model of whose warnings the caller is told."""
-    for warning in fitted._model.warnings():
+    for warning in model._model.warnings():
         _said.warn(warning, EstimationWarning, stacklevel=stacklevel)
-    return fitted
+    return model

@@ -8,17 +8,19 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
 from types import SimpleNamespace
-from typing import Any, Union
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
 from thetahat import _thetahat
-from thetahat.base import said as _said
-from thetahat.base.said import EstimationWarning
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import EquationsOptions, Rows
+from thetahat.engine.fit_options import EquationsOptions
+from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _FUNCTIONS = {
     np.sin: "sin",
@@ -340,20 +342,11 @@ Equations = Union[GreyBox, str, "os.PathLike[str]", Mapping[str, Any]]
 """A model in equations, or what `GreyBox` makes one of."""
 
 
+@_options.takes(EquationsOptions)
 def grey(
     log: Log,
     model: Equations,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[EquationsOptions],
 ) -> Model:
     """Find the unknown parameters of a model in equations: those of the largest likelihood, as ``thetahat fit --grey`` does.
 
@@ -406,9 +399,6 @@ def grey(
     >>> model.parameters.round(2)
     array([2.])
     """
-    words = _options.words(EquationsOptions, locals(), len(log) if isinstance(log, Log) else None)
     box = model if isinstance(model, GreyBox) else GreyBox(model)
-    found = Model._of(_thetahat.fit_equations(handle("log", log), box._model, words))
-    for warning in found.warnings:
-        _said.warn(warning, EstimationWarning, stacklevel=2)
-    return found
+    data = handle("log", log)
+    return told(Model._of(_thetahat.fit_equations(data, box._model, _options.plan(options, len(log)))), stacklevel=4)

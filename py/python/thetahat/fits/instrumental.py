@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from thetahat.engine.options import Band, Orders, Rows
-from thetahat.fits.fit import _fit
+from thetahat.engine import options as _options
+from thetahat.engine.fit_options import FitOptions
+from thetahat.engine.values import Orders
+from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log
 from thetahat.models.model import Model
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@_options.takes(FitOptions)
 def iv(
     log: Log,
     na: int,
     nb: Orders,
     nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit A and B of an ARX model by instrumental variables in four stages: right about the plant whatever the noise.
 
@@ -34,7 +31,7 @@ def iv(
         The data.
     na, nb, nk
         As for `arx`.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend
+    **options
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -56,24 +53,16 @@ def iv(
     >>> th.iv(th.dc_motor(), na=2, nb=2).method
     'instrumental-variables'
     """
-    return _fit("arx", locals(), "--method=iv")
+    return fitted(log, {"model": "arx", "method": "iv", "na": na, "nb": nb, "nk": nk}, options)
 
 
+@_options.takes(FitOptions)
 def sriv(
     log: Log,
     nb: Orders,
     nf: Orders,
     nk: Orders = 1,
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    prefilter: Band | None = None,
-    initial: str | None = None,
-    constant: str | None = None,
-    trend: bool | None = None,
+    **options: Unpack[FitOptions],
 ) -> Model:
     """Fit B and F of an output error model by refined instrumental variables: right about the plant whatever the noise.
 
@@ -83,7 +72,7 @@ def sriv(
         The data.
     nb, nf, nk
         As for `oe`.
-    estimate, validate, split, detrend, offset, prefilter, initial, constant, trend
+    **options
         What to fit to, see `thetahat.FitOptions`.
 
     Returns
@@ -105,4 +94,4 @@ def sriv(
     >>> th.sriv(th.dc_motor(), nb=2, nf=2).method
     'refined-instrumental-variables'
     """
-    return _fit("oe", locals(), "--method=sriv")
+    return fitted(log, {"model": "oe", "method": "sriv", "nb": nb, "nf": nf, "nk": nk}, options)

@@ -2,54 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Union
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, Union
 
-from thetahat import _thetahat
-from thetahat.base import said as _said
-from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.options import NarxOptions, Rows
-from thetahat.logs.log import Log, handle
+from thetahat.engine.fit_options import NarxOptions
+from thetahat.fits.fit import fitted
+from thetahat.logs.log import Log
 from thetahat.models.model import Model
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Lags = Union[int, Sequence[int]]
 """A number for all channels, or one for each."""
 
+Map = Literal["poly", "rbf", "spline", "local", "knn", "tanh", "logistic", "relu", "hinge", "step", "rbf-free", "auto"]
+"""The functions of a nonlinear ARX model."""
 
+
+@_options.takes(NarxOptions)
 def narx(
     log: Log,
-    map: str = "poly",
+    map: Map | str = "poly",
     *,
     ny: Lags | None = None,
     nu: Lags | None = None,
     nk: Lags | None = None,
-    regressors: Sequence[str] | None = None,
-    degree: int | None = None,
-    terms: int | Sequence[str] | None = None,
-    most_terms: int | None = None,
-    centres: str | None = None,
-    width: float | None = None,
-    units: int | None = None,
-    linear: bool | None = None,
-    membership: str | None = None,
-    select: str | None = None,
-    ridge: float | None = None,
-    raw_terms: bool | None = None,
-    drawn: bool | None = None,
-    focus: str | int | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    seed: int | None = None,
-    time_limit: float | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
+    **options: Unpack[NarxOptions],
 ) -> Model:
     """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k).
 
@@ -105,9 +85,4 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
     >>> sorted(model.parameter_names)
     ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
     """
-    words = [f"--narx={_options.text('map', map)}", *_options.order_words(ny=ny, nu=nu, nk=nk)]
-    words += _options.words(NarxOptions, locals(), len(log) if isinstance(log, Log) else None)
-    found = Model._of(_thetahat.fit_narx(handle("log", log), words))
-    for warning in found.warnings:
-        _said.warn(warning, EstimationWarning, stacklevel=2)
-    return found
+    return fitted(log, {"narx": map, "ny": ny, "nu": nu, "nk": nk}, options)

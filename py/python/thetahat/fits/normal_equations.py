@@ -9,9 +9,9 @@ from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.options import FitOptions, NarxOptions, Order, Orders
+from thetahat.engine.values import Order, Orders
 from thetahat.fits.narx import Lags
-from thetahat.fits.state_space import subspace_words
+from thetahat.fits.state_space import states
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
@@ -136,15 +136,17 @@ class NormalEquations:
         constant: str | None = None,
     ) -> None:
         data = handle("log", log)
+        common = {"detrend": detrend, "offset": offset, "constant": constant}
+        own: dict[str, Any]
         found: dict[str, Any] = {"weighting": weighting, "feedthrough": feedthrough, "horizons": horizons}
         if order is not None:
             others = {"na": na, "nb": nb, "taps": taps, "terms": terms, "select": select, "couple": couple}
             for name, value in others.items():
                 if value is not None:
                     raise ValueError(f"{name}: it is not of state-space models; leave it or the order out")
-            words = subspace_words(order, nk, weighting, *both_horizons(horizons), feedthrough)
-            words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
-            self._sums = _thetahat.NormalEquations(data, words, _past(past))
+            back, ahead = both_horizons(horizons)
+            own = {**states(order, nk), "weighting": weighting, "past": back, "future": ahead, "feedthrough": feedthrough}
+            self._sums = _thetahat.NormalEquations(data, _options.plan({**own, **common}), _past(past))
             return
         for name, value in found.items():
             if value is not None:
@@ -156,9 +158,9 @@ class NormalEquations:
                     raise ValueError(f"{name}: it is not of nonlinear models, whose products are named; leave it or the terms out")
             if isinstance(terms, str):
                 raise TypeError(f"terms: expected a sequence of str, or an int, found {terms!r}")
-            words = ["--narx=poly", *_options.order_words(ny=ny, nu=nu, nk=nk)]
-            words += _options.words(NarxOptions, locals())
-            self._sums = _thetahat.NormalEquations(data, words, _past(past))
+            own = {"narx": "poly", "ny": ny, "nu": nu, "nk": nk, "terms": terms, "select": select, "degree": degree}
+            own |= {"most_terms": most_terms, "regressors": regressors, "raw_terms": raw_terms}
+            self._sums = _thetahat.NormalEquations(data, _options.plan({**own, **common}), _past(past))
             return
         products: dict[str, Any] = {"ny": ny, "nu": nu, "degree": degree, "most_terms": most_terms, "regressors": regressors}
         products["raw_terms"] = raw_terms or None
@@ -174,19 +176,16 @@ class NormalEquations:
             if na is not None or nb is not None:
                 raise ValueError("taps: an impulse response has neither na nor nb; leave them out, or give no taps")
             named = "none" if kernel is None else _options.text("kernel", kernel)
-            words = ["--model=fir", *_options.order_words(taps=taps, nk=0 if nk is None else nk), f"--kernel={named}"]
+            own = {"model": "fir", "taps": taps, "nk": 0 if nk is None else nk, "kernel": named}
         elif na is None and nb is None:
             raise ValueError("na: give the orders na and nb, or taps, terms or an order")
         elif nb is None:
             if nk is not None:
                 raise ValueError("nk: it is for inputs; give nb too, or leave it out")
-            words = ["--model=arx", *_options.order_words(na=na, nb=0)] if several else ["--model=ar", *_options.order_words(na=na)]
+            own = {"model": "arx", "na": na, "nb": 0, "couple": couple} if several else {"model": "ar", "na": na}
         else:
-            orders = _options.order_words(na=0 if na is None else na, nb=nb, nk=1 if nk is None else nk)
-            words = ["--model=arx", *orders]
-        words += [] if couple is None else [f"--couple={_options.text('couple', couple)}"]
-        words += _options.words(FitOptions, {"detrend": detrend, "offset": offset, "constant": constant})
-        self._sums = _thetahat.NormalEquations(data, words, _past(past))
+            own = {"model": "arx", "na": 0 if na is None else na, "nb": nb, "nk": 1 if nk is None else nk, "couple": couple}
+        self._sums = _thetahat.NormalEquations(data, _options.plan({**own, **common}), _past(past))
 
     @classmethod
     def _of(cls, sums: _thetahat.NormalEquations) -> NormalEquations:

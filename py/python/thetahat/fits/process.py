@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from thetahat import _thetahat
-from thetahat.base import said as _said
-from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.options import FitOptions, Rows
+from thetahat.engine.fit_options import ProcessOptions
 from thetahat.experiments.spectrum import MeasuredResponse
+from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@_options.takes(ProcessOptions)
 def process(
     log: Log | MeasuredResponse,
     structure: str | Sequence[str] = "p1d",
-    *,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    trend: bool | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[ProcessOptions],
 ) -> Model:
     """Fit a process in continuous time, such as y = K e^(-theta s)/(1 + tau s) u, by the least errors of its free run.
 
@@ -84,28 +75,18 @@ def process(
     {'K': 2.0, 'tau': 8.0, 'theta': 1.5}
     """
     names = [structure] if isinstance(structure, str) else list(structure)
-    words = [f"--structure={','.join(_options.text('structure', name) for name in names)}"]
-    return _fitted(log, words, locals())
+    named = ",".join(_options.text("structure", name) for name in names)
+    return _fitted(log, {"model": "process", "structure": named}, options)
 
 
+@_options.takes(ProcessOptions)
 def tf(
     log: Log | MeasuredResponse,
     np: int | Sequence[int],
     nz: int | Sequence[int] | None = None,
     *,
     delay: bool = False,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    offset: Mapping[str, float] | None = None,
-    initial: str | None = None,
-    trend: bool | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    step: float | tuple[float, float] | None = None,
-    starts: int | None = None,
-    time_limit: float | None = None,
+    **options: Unpack[ProcessOptions],
 ) -> Model:
     """Fit transfer functions in continuous time, y = B(s)/A(s) e^(-theta s) u, by the least errors of their free run.
 
@@ -159,18 +140,12 @@ def tf(
     >>> dict(zip(model.parameter_names, np.round(model.parameters, 3).tolist()))
     {'b0': 2.0, 'a1': 2.0, 'a0': 1.0}
     """
-    words = ["--model=tf", *_options.order_words(np=np, nz=nz)]
-    words += ["--delay"] if _options.flag("delay", delay) else []
-    return _fitted(log, words, locals())
+    return _fitted(log, {"model": "tf", "np": np, "nz": nz, "delay": delay or None}, options)
 
 
-def _fitted(log: Log | MeasuredResponse, structure: list[str], options: Mapping[str, Any]) -> Model:
+def _fitted(log: Log | MeasuredResponse, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
     if isinstance(log, MeasuredResponse):
-        words = structure + _options.words(FitOptions, options)
-        found = Model._of(_thetahat.fit_process_to_response(log.to_json(), words))
+        found = Model._of(_thetahat.fit_response(log.to_json(), _options.plan({**own, **options})))
     else:
-        words = structure + _options.words(FitOptions, options, len(log))
-        found = Model._of(_thetahat.fit_process(handle("log", log), words))
-    for warning in found.warnings:
-        _said.warn(warning, EstimationWarning, stacklevel=3)
-    return found
+        found = Model._of(_thetahat.fit(handle("log", log), _options.plan({**own, **options}, len(log))))
+    return told(found, stacklevel=5)

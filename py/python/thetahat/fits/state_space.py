@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Union
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from thetahat import _thetahat
-from thetahat.base import said as _said
-from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.options import FitOptions, Orders, Rows
-from thetahat.logs.log import Log, handle
+from thetahat.engine.fit_options import StateSpaceOptions
+from thetahat.engine.values import Orders
+from thetahat.fits.fit import fitted
+from thetahat.logs.log import Log
 from thetahat.models.model import Model
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+
+@_options.takes(StateSpaceOptions)
 def ss(
     log: Log,
     order: int | range | None = None,
     *,
-    nk: Union[int, Sequence[int], None] = None,
-    weighting: str | None = None,
-    past: int | None = None,
-    future: int | None = None,
-    feedthrough: bool | None = None,
-    refine: str | None = None,
-    search: str | None = None,
-    max_iterations: int | None = None,
-    tolerance: float | None = None,
-    time_limit: float | None = None,
-    estimate: Rows | None = None,
-    validate: Rows | None = None,
-    split: tuple[float, float, float] | None = None,
-    detrend: str | None = None,
-    offset: Mapping[str, float] | None = None,
-    constant: str | None = None,
+    nk: int | Sequence[int] | None = None,
+    **options: Unpack[StateSpaceOptions],
 ) -> Model:
     """Fit a state-space model, x(t+1) = F x(t) + G u(t) + K e(t), y(t) = H x(t) + D u(t) + e(t), by a subspace method.
 
@@ -102,29 +91,11 @@ def ss(
     >>> abs(value + 5) < 3 * error
     True
     """
-    words = subspace_words(order, nk, weighting, past, future, feedthrough)
-    words += [] if refine is None else [f"--refine={_options.text('refine', refine)}"]
-    words += _options.words(FitOptions, locals(), len(log) if isinstance(log, Log) else None)
-    found = Model._of(_thetahat.fit_state_space(handle("log", log), words))
-    for warning in found._model.warnings():
-        _said.warn(warning, EstimationWarning, stacklevel=2)
-    return found
+    return fitted(log, states(order, nk), options)
 
 
-def subspace_words(
-    order: int | range | str | None,
-    nk: Orders | None,
-    weighting: str | None,
-    past: int | None,
-    future: int | None,
-    feedthrough: bool | None,
-) -> list[str]:
-    """How the states are found, as options; the order "auto" is left to the data, as none is."""
+def states(order: int | range | str | None, nk: Orders | None) -> dict[str, Any]:
+    """What asks for a model in state space; the order "auto" is left to the data, as none is."""
     if isinstance(order, str) and order != "auto":
         raise TypeError(f'order: expected an int, a range or "auto", found {order!r}')
-    words = ["--model=ss", *_options.order_words(order=None if isinstance(order, str) else order, nk=nk)]
-    words += [] if weighting is None else [f"--weighting={_options.text('weighting', weighting)}"]
-    words += [] if past is None else [f"--past={_options.count('past', past)}"]
-    words += [] if future is None else [f"--future={_options.count('future', future)}"]
-    words += [] if feedthrough is None else [f"--feedthrough={'yes' if _options.flag('feedthrough', feedthrough) else 'no'}"]
-    return words
+    return {"model": "ss", "order": None if isinstance(order, str) else order, "nk": nk}

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from thetahat import _thetahat
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import Duration, ReadOptions, Resample
+from thetahat.engine.options import ReadOptions
+from thetahat.engine.values import Duration, Resample
 from thetahat.logs.log import Log
 
 
@@ -116,6 +117,7 @@ class Inspection(Document):
         return f"Inspection({self.document['rows']} rows, {count} warning{'' if count == 1 else 's'})"
 
 
+@_options.takes()
 def inspect(
     log: Log | str | os.PathLike[str],
     *,
@@ -125,7 +127,7 @@ def inspect(
     sample_time: Duration | None = None,
     resample: Resample | None = None,
     time_format: str | None = None,
-    time_unit: str | None = None,
+    time_unit: Literal["ns", "us", "ms", "s", "min", "h", "d"] | None = None,
     time_zone: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,

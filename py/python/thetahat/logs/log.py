@@ -12,7 +12,7 @@ from thetahat import _thetahat
 from thetahat.base import clock as _clock, frames as _frames, numbers as _numbers, picture as _picture, said as _said
 from thetahat.base.clock import Clock
 from thetahat.engine import options as _options
-from thetahat.engine.options import Duration, Resample
+from thetahat.engine.values import Duration, Resample
 
 
 class Log:

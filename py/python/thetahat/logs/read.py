@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,10 +13,12 @@ from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.base.clock import Clock, labels_from
 from thetahat.engine import options as _options
-from thetahat.engine.options import Duration, ReadOptions, Resample
+from thetahat.engine.options import ReadOptions
+from thetahat.engine.values import Duration, Resample
 from thetahat.logs.log import Log, names_of
 
 
+@_options.takes()
 def read_csv(
     path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     *,
@@ -27,7 +29,7 @@ def read_csv(
     resample: Resample | None = None,
     uniform: bool = True,
     time_format: str | None = None,
-    time_unit: str | None = None,
+    time_unit: Literal["ns", "us", "ms", "s", "min", "h", "d"] | None = None,
     time_zone: str | None = None,
     delimiter: str | None = None,
     comment: str | None = None,
@@ -90,6 +92,7 @@ def read_csv(
     return _read(path, inputs, output, locals(), uniform=uniform)
 
 
+@_options.takes()
 def read_log(
     path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     *,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +15,14 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers, picture as _picture, said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import Rows, ValidationOptions
+from thetahat.engine.options import ValidationOptions
 from thetahat.logs.log import Log, handle
 from thetahat.models.forms import ConvertibleModel
 from thetahat.models.responses import Forecast, FrequencyResponse, TransientResponse
 from thetahat.models.validation import Validation
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Array = npt.NDArray[np.float64]
 
@@ -325,17 +329,12 @@ class Model(ConvertibleModel):
         values = self.predict(log, horizon, initial=initial)
         return _beside([log[output] for output in self.outputs]) - values
 
+    @_options.takes(ValidationOptions)
     def validate(
         self,
         log: Log,
         require: str | Sequence[str] | None = None,
-        *,
-        rows: Rows | None = None,
-        detrend: str | None = None,
-        horizon: int | Sequence[int] | None = None,
-        lags: int | None = None,
-        alpha: float | None = None,
-        alphas: Sequence[float] | None = None,
+        **options: Unpack[ValidationOptions],
     ) -> Validation:
         """Say how the model does on a log: fits, tests of its residuals, coverage of its intervals.
 
@@ -367,7 +366,7 @@ class Model(ConvertibleModel):
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        words = _options.words(ValidationOptions, locals(), len(log) if isinstance(log, Log) else None)
+        words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
         words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
         return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
 
@@ -478,10 +477,14 @@ class Model(ConvertibleModel):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Model):
             return NotImplemented
-        return self.to_json() == other.to_json()
+        return self._found() == other._found()
 
     def __hash__(self) -> int:
-        return hash(self.to_json())
+        return hash(self._found())
+
+    def _found(self) -> str:
+        """The document without the options that it was made of, which may say the same in other words."""
+        return json.dumps({name: value for name, value in self.document.items() if name != "plan"})
 
     def __reduce__(self) -> tuple[Any, ...]:
         return (Model.from_json, (self.to_json(),))

@@ -84,6 +84,12 @@ class ReportedModel:
         document: dict[str, Any] = json.loads(self.to_json())
         return document
 
+    @property
+    def plan(self) -> dict[str, Any] | None:
+        """The options of the fit, with which ``thetahat.fit(log, plan=...)`` and ``thetahat fit --plan`` repeat it."""
+        plan = self.document.get("plan")
+        return None if plan is None else dict(plan)
+
     # The figures of the fit take longer than least squares: what does not need them does not wait for them.
     @cached_property
     def _parts(self) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat.base import clock as _clock, numbers as _numbers, picture as _picture
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import Duration
+from thetahat.engine.values import Duration
 from thetahat.fits.grey_box import GreyBox
 from thetahat.logs.log import Log
 from thetahat.models.model import Model

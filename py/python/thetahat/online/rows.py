@@ -12,7 +12,7 @@ import numpy.typing as npt
 from thetahat.base import clock as _clock, frames as _frames, numbers as _numbers
 from thetahat.base.clock import Clock
 from thetahat.engine import options as _options
-from thetahat.engine.options import Duration
+from thetahat.engine.values import Duration
 from thetahat.logs.log import Log
 
 Array = npt.NDArray[np.float64]

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import Duration
+from thetahat.engine.values import Duration
 
 if TYPE_CHECKING:
     import os

@@ -14,7 +14,7 @@ from thetahat import _thetahat
 from thetahat._thetahat import Forgetting
 from thetahat.base import clock as _clock, numbers as _numbers
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import Duration
+from thetahat.engine.values import Duration
 from thetahat.models.model import Model
 from thetahat.online import rows as _rows
 from thetahat.online.tracked import Tracked, TrackTrajectory, shaped

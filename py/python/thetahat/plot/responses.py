@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.experiments.step_test import StepTest

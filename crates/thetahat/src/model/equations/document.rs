@@ -6,6 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+pub(crate) use crate::text::suggestion;
 use crate::{Error, text};
 
 /// An error at a place of a text, with line and column, both counted from 1.
@@ -16,36 +17,9 @@ pub(crate) fn error_at(text: &str, offset: usize, message: impl AsRef<str>) -> E
     Error::Model { line, column, message: text::message(message.as_ref()) }
 }
 
-/// The name that differs least from a word, if one is near: at most a third of its characters have to be changed, and
-/// not all of them.
-///
-/// (Levenshtein 1966, by Wagner and Fischer's recursion of 1974.)
-fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
-    let letters: Vec<char> = word.chars().take(100).flat_map(char::to_lowercase).collect();
-    let distance = |name: &str| {
-        let mut row: Vec<usize> = (0..=letters.len()).collect();
-        for (i, there) in name.chars().take(100).flat_map(char::to_lowercase).enumerate() {
-            let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-            for (j, here) in letters.iter().enumerate() {
-                let changed = diagonal + usize::from(*here != there);
-                diagonal = row[j + 1];
-                row[j + 1] = changed.min(diagonal + 1).min(row[j] + 1);
-            }
-        }
-        row[letters.len()]
-    };
-    let best = names.into_iter().map(|name| (distance(name), name)).min_by_key(|(distance, _)| *distance)?;
-    (best.0 <= letters.len().div_ceil(3) && best.0 < letters.len()).then_some(best.1)
-}
-
 /// A word as it is quoted in an error: not too long, and without control characters.
 pub(crate) fn quoted(word: &str) -> String {
     format!("'{}'", text::brief(word, 40))
-}
-
-/// "; did you mean 'x'?" or nothing.
-pub(crate) fn suggestion<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> String {
-    nearest(word, names).map_or(String::new(), |name| format!("; did you mean '{name}'?"))
 }
 
 /// A TOML document that was parsed.

@@ -144,6 +144,7 @@ pub fn fit_process_to_response(
     Ok(Report {
         schema: Report::SCHEMA.to_owned(),
         generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        plan: None,
         data,
         selection: None,
         decisions: Vec::new(),

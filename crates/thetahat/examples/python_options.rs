@@ -1,0 +1,173 @@
+//! Writes the options of fits as Python has them, `py/python/thetahat/engine/fit_options.py`, from the one table of
+//! options; its test says whether it is up to date.
+//!
+//! ```text
+//! cargo run -p thetahat --example python_options
+//! ```
+
+use std::error::Error;
+use std::fmt::Write;
+use std::fs;
+
+use thetahat::plan::{FIT_OPTIONS, FitOption, Form, Kinds};
+
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../py/python/thetahat/engine/fit_options.py");
+
+/// The parameters that functions have before their options: what the model is about, its structure and its orders.
+const OWN_PARAMETERS: [&str; 23] = [
+    "couple",
+    "delay",
+    "input",
+    "kernel",
+    "method",
+    "model",
+    "na",
+    "narx",
+    "nb",
+    "nc",
+    "nd",
+    "nf",
+    "nk",
+    "np",
+    "nu",
+    "ny",
+    "nz",
+    "order",
+    "output",
+    "path",
+    "structure",
+    "taps",
+    "term",
+];
+
+/// A class, what it says, and the kind of model whose options it has.
+const CLASSES: [(&str, &str, Kinds); 6] = [
+    (
+        "FitOptions",
+        "What every fit of a model of polynomials can be told, beside the orders.",
+        Kinds::POLYNOMIAL,
+    ),
+    ("ImpulseResponseOptions", "What a fit of an impulse response can be told.", Kinds::IMPULSE_RESPONSE),
+    ("StateSpaceOptions", "What a fit of a model in state space can be told.", Kinds::STATE_SPACE),
+    ("ProcessOptions", "What a fit of a process in continuous time can be told.", Kinds::PROCESS),
+    ("NarxOptions", "What a fit of a nonlinear ARX model can be told.", Kinds::NONLINEAR_ARX),
+    ("EquationsOptions", "What a fit of a model in equations can be told.", Kinds::EQUATIONS),
+];
+
+const HEAD: &str = r#""""The options of fits, written from the one table of options: ``cargo run -p thetahat --example python_options``."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, Optional, TypedDict, Union
+
+from thetahat.engine.values import Band, Bound, Rows
+"#;
+
+/// The name, type and documentation of an option in Python, where they are not those of the table.
+fn own(option: &FitOption) -> (String, String, String) {
+    let help = spelled(option.help.trim());
+    let words = (option.words)();
+    let kind = match option.python {
+        "" => {
+            let words: Vec<String> = words.iter().map(|known| format!("\"{}\"", known.word)).collect();
+            format!("Literal[{}]", words.join(", "))
+        }
+        kind => kind.to_owned(),
+    };
+    let many = matches!(option.form, Form::Repeated | Form::List) && kind.is_empty();
+    let kind = if many { "Sequence[str]".to_owned() } else { kind };
+    match option.field {
+        "regressor" => ("regressors".to_owned(), "Sequence[str]".to_owned(), help),
+        "no_linear" => (
+            "linear".to_owned(),
+            "bool".to_owned(),
+            "Whether a constant and the regressors themselves stand beside radial basis functions (rbf); whether \
+             local models, and what neighbours say, are planes (local, knn)"
+                .to_owned(),
+        ),
+        "terms" => (
+            "terms".to_owned(),
+            "Union[int, Sequence[str]]".to_owned(),
+            format!("{help}; or products by name, as ``Model.parameter_names`` has them"),
+        ),
+        "feedthrough" => (
+            "feedthrough".to_owned(),
+            "bool".to_owned(),
+            "Whether inputs act on the outputs in the same sample".to_owned(),
+        ),
+        field => (field.to_owned(), kind, help),
+    }
+}
+
+/// Names of options as they are in Python.
+fn spelled(text: &str) -> String {
+    text.split('`')
+        .enumerate()
+        .map(
+            |(index, part)| {
+                if index % 2 == 1 { format!("``{}``", part.replace('-', "_")) } else { part.to_owned() }
+            },
+        )
+        .collect()
+}
+
+/// Lines of at most so many columns.
+fn wrapped(text: &str, indent: &str) -> String {
+    let (mut lines, mut line) = (String::new(), indent.to_owned());
+    for word in text.split_whitespace() {
+        if line.chars().count() + word.chars().count() >= 110 {
+            lines.push_str(line.trim_end());
+            lines.push('\n');
+            line = indent.to_owned();
+        }
+        line.push_str(word);
+        line.push(' ');
+    }
+    lines + line.trim_end() + "\n"
+}
+
+/// The file that the table makes.
+fn file() -> Result<String, Box<dyn Error>> {
+    let mut text = HEAD.to_owned();
+    for (name, says, kind) in CLASSES {
+        let takes = |option: &&FitOption| {
+            let chosen = kind == Kinds::POLYNOMIAL && option.field == "select";
+            option.kinds.contains(kind) && !OWN_PARAMETERS.contains(&option.field) && !chosen
+        };
+        let options: Vec<&FitOption> = FIT_OPTIONS.iter().filter(takes).collect();
+        write!(
+            text,
+            "\n\nclass {name}(TypedDict, total=False):\n    \"\"\"{says}\n\n    Attributes\n    ----------\n"
+        )?;
+        for option in &options {
+            let (field, _, help) = own(option);
+            let known = if field == "feedthrough" { Vec::new() } else { (option.words)() };
+            let words: String = known
+                .iter()
+                .map(|known| format!("; ``\"{}\"``: {}", known.word, spelled(known.help)))
+                .collect();
+            let default = match option.default {
+                "" => String::new(),
+                default => format!(" [default: {}]", spelled(default)),
+            };
+            writeln!(text, "    {field}")?;
+            text.push_str(&wrapped(&format!("{help}{words}{default}"), "        "));
+        }
+        text.push_str("    \"\"\"\n\n");
+        for option in options {
+            let (field, kind, _) = own(option);
+            writeln!(text, "    {field}: Optional[{kind}]")?;
+        }
+    }
+    Ok(text)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    Ok(fs::write(FILE, file()?)?)
+}
+
+#[test]
+fn the_options_of_python_are_those_of_the_table() {
+    let written = fs::read_to_string(FILE).expect("the file");
+    let made = file().expect("text");
+    assert!(made == written, "not up to date: cargo run -p thetahat --example python_options");
+}

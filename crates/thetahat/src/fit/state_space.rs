@@ -1,0 +1,188 @@
+//! Models in state space, and ARX models with several outputs.
+
+use std::ops::RangeInclusive;
+
+use super::search::{self, within};
+use super::{Common, common};
+use crate::Error;
+use crate::estimate::{Coupling, Initial, SubspaceOptions, VectorArxInputs, VectorArxOptions};
+use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions};
+use crate::report::StateSpacePlan;
+use crate::select::{Focus, OrderRange};
+
+/// The orders of an ARX model that are looked at where none are given.
+const CHOSEN_LAGS: RangeInclusive<usize> = 1..=8;
+/// More lags than anybody has.
+const MOST_LAGS: usize = 200;
+
+/// A model in state space of which the channels are open.
+#[derive(Debug)]
+pub(super) struct StateSpaceDraft {
+    /// Whether there are inputs at all.
+    pub(super) driven: bool,
+    /// Samples that inputs wait: none, one for all or one for each.
+    delays: Vec<RangeInclusive<usize>>,
+    /// The rest of the plan.
+    plan: StateSpacePlan,
+}
+
+impl StateSpaceDraft {
+    /// A model of a subspace method, or an ARX model with several outputs.
+    pub(super) fn new(options: &FitOptions, is_arx: bool) -> Result<Self, Error> {
+        let without_inputs = options.is_without_inputs();
+        check(options, is_arx)?;
+        let Common { estimate, validate, split, detrend, offsets } = common(options)?;
+        let order = options.order.map(|order| order.first()..=order.last());
+        if order.as_ref().is_some_and(|order| *order.start() == 0) {
+            return Err(Error::argument("order", "write it as N or A..B, from 1 on, such as 4 or 1..10"));
+        }
+        let plan = StateSpacePlan {
+            estimate,
+            validate,
+            split,
+            detrend,
+            offsets,
+            orders: order,
+            subspace: SubspaceOptions {
+                weighting: options.weighting.unwrap_or_default(),
+                past: within("past", options.past, 1..=1000)?,
+                future: within("future", options.future, 1..=1000)?,
+                feedthrough: match options.feedthrough.unwrap_or_default() {
+                    FeedthroughWord::Auto => None,
+                    FeedthroughWord::Yes => Some(true),
+                    FeedthroughWord::No => Some(false),
+                },
+                constant: false,
+            },
+            constant: options.constant.unwrap_or_default(),
+            refine: options.refine,
+            search: search::search(options)?,
+            arx: if is_arx { Some(arx(options, without_inputs)?) } else { None },
+            ..StateSpacePlan::new(&[], &[])
+        };
+        let delay = |DelayRange(delay): &DelayRange| {
+            if !(is_arx && options.nk.len() == 1) && delay.single().is_none() {
+                return Err(Error::argument(
+                    "nk",
+                    format!(
+                        "{delay}: a range is for all inputs of an ARX model; give a number for each input, such as 3"
+                    ),
+                ));
+            }
+            if delay.single().is_none() && delay.last() > MOST_LAGS {
+                let message =
+                    format!("{delay}: a range of delays ends with {MOST_LAGS} at most, such as 0..10");
+                return Err(Error::argument("nk", message));
+            }
+            Ok(delay.first()..=delay.last())
+        };
+        let delays = options.nk.iter().map(delay).collect::<Result<_, Error>>()?;
+        Ok(Self { driven: !without_inputs, delays, plan })
+    }
+
+    /// The plan for the channels of a log. Without feedthrough an input acts one sample later by itself.
+    pub(super) fn plan(self, inputs: Vec<String>, outputs: Vec<String>) -> Result<StateSpacePlan, Error> {
+        let count = inputs.len();
+        let delays = match &*self.delays {
+            [] => Vec::new(),
+            [all] => vec![*all.start(); count],
+            several if several.len() == count => several.iter().map(|delay| *delay.start()).collect(),
+            several => {
+                return Err(Error::argument(
+                    "nk",
+                    format!("{} numbers for {count} inputs; give one for all or one for each", several.len()),
+                ));
+            }
+        };
+        let mut plan = StateSpacePlan { inputs, outputs, ..self.plan };
+        if let Some(arx) = &mut plan.arx {
+            if let VectorArxInputs::Each(nb) = &arx.nb
+                && nb.len() != count
+            {
+                return Err(Error::argument(
+                    "nb",
+                    format!("{} numbers for {count} inputs; give one for all or one for each", nb.len()),
+                ));
+            }
+            arx.delay = self.delays.first().map_or(0..=0, |delays| 0..=delays.end() - delays.start());
+            arx.direct = delays.contains(&0);
+            plan.delays = delays.iter().map(|delay| delay - usize::from(!arx.direct)).collect();
+        } else if !delays.is_empty() {
+            // u(t - nk) acts on y(t): through D if some input acts at once, else through G.
+            let at_once = delays.contains(&0) || plan.subspace.feedthrough == Some(true);
+            if delays.contains(&0) && plan.subspace.feedthrough == Some(false) {
+                return Err(Error::argument(
+                    "nk",
+                    "0 says that an input acts at once, and `feedthrough` no that none does; leave one out",
+                ));
+            }
+            plan.subspace.feedthrough = Some(at_once);
+            plan.delays = delays.iter().map(|delay| delay - usize::from(!at_once)).collect();
+        }
+        plan.check()?;
+        Ok(plan)
+    }
+}
+
+/// Among which ARX models with several outputs the data choose.
+fn arx(options: &FitOptions, without_inputs: bool) -> Result<VectorArxOptions, Error> {
+    let lags = |option: &str, range: &OrderRange| {
+        if range.last() > MOST_LAGS {
+            let message = format!("{range}: write it as N or A..B, {MOST_LAGS} at most, such as 2 or 1..8");
+            return Err(Error::argument(option, message));
+        }
+        Ok(range.first()..=range.last())
+    };
+    let nb = options.nb.iter().map(|range| lags("nb", range)).collect::<Result<Vec<_>, Error>>()?;
+    let each =
+        || nb.iter().map(|nb| (nb.start() == nb.end()).then_some(*nb.start())).collect::<Option<Vec<_>>>();
+    let nb = match &*nb {
+        _ if without_inputs => VectorArxInputs::Alike(0..=0),
+        [] => VectorArxInputs::Alike(CHOSEN_LAGS),
+        [one] => VectorArxInputs::Alike(one.clone()),
+        _ => VectorArxInputs::Each(each().ok_or_else(|| {
+            Error::argument("nb", "with several outputs give one range for all inputs, or a number for each")
+        })?),
+    };
+    Ok(VectorArxOptions {
+        na: options.na.as_ref().map_or(Ok(CHOSEN_LAGS), |range| lags("na", range))?,
+        nb,
+        coupling: match options.couple {
+            None | Some(CoupleWord::Auto) => None,
+            Some(CoupleWord::Full) => Some(Coupling::Full),
+            Some(CoupleWord::None) => Some(Coupling::None),
+        },
+        delay: 0..=0,
+        direct: false,
+        constant: false,
+    })
+}
+
+/// What the table of options does not say: options whose values go with some models alone.
+fn check(options: &FitOptions, is_arx: bool) -> Result<(), Error> {
+    let refused = |option: &str, message: &str| Err(Error::argument(option, message));
+    if options.refine.is_none()
+        && let Some(option) = options.first_given(&search::OPTIONS)
+    {
+        return refused(&option, "it is for a search; give `refine` too");
+    }
+    if !is_arx && !options.nb.is_empty() && !options.is_without_inputs() {
+        return refused(
+            "nb",
+            "models in state space have no polynomials; leave it out, or give 0 for no inputs",
+        );
+    }
+    if !matches!(options.initial.unwrap_or_default(), Initial::Auto | Initial::Estimate) {
+        return refused("initial", "the state of models in state space is estimated; leave it out");
+    }
+    if !matches!(options.focus.unwrap_or_default(), Focus::Auto | Focus::Prediction) {
+        return refused(
+            "focus",
+            "models in state space are of predictions; leave it out, or give `refine` simulation",
+        );
+    }
+    if options.is_without_inputs() && !options.input.is_empty() {
+        return refused("nb", "0 makes a model without inputs; leave out `input` or `nb`");
+    }
+    Ok(())
+}

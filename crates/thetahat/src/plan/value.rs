@@ -1,0 +1,368 @@
+//! The values of options: how they are written as text and as JSON, and what a reader is told of them.
+
+use serde_json::{Map, Number, Value};
+
+use crate::Error;
+use crate::data::{Detrend, Prefilter, Rows, Split};
+use crate::estimate::{Bound, GainBound, Refine, Weighting};
+use crate::model::ProcessStructure;
+use crate::select::{Focus, OrderRange, Select};
+
+/// How often an option may stand on a command line, and what its value is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Once, without a value.
+    Flag,
+    /// Once, with a value.
+    Single,
+    /// One list of values between commas, or several.
+    List,
+    /// Lists of names, of which one may hold a comma.
+    Names,
+    /// Once for each value.
+    Repeated,
+}
+
+/// A value that an option may have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Word {
+    /// As it is written.
+    pub word: &'static str,
+    /// How it may be written too.
+    pub alias: Option<&'static str>,
+    /// What it means.
+    pub help: &'static str,
+}
+
+/// The value of an option, and whether there is one.
+pub(super) trait OptionValue: Default {
+    const FORM: Form;
+    /// Its type in Python.
+    const PYTHON: &'static str;
+    /// What it may be, where that is a list.
+    fn words() -> Vec<Word>;
+    /// Whether it was given.
+    fn is_given(&self) -> bool;
+    /// Reads it.
+    fn read(option: &str, value: &Value) -> Result<Self, Error>;
+    /// As it is written in a plan.
+    fn write(&self) -> Value;
+    /// What JSON may hold, as a JSON Schema.
+    fn schema() -> Value {
+        let one = match &*Self::words() {
+            [] => serde_json::json!({ "type": ["string", "number"] }),
+            words => serde_json::json!({ "enum": words.iter().map(|own| own.word).collect::<Vec<_>>() }),
+        };
+        match Self::FORM {
+            Form::Flag => serde_json::json!({ "type": "boolean" }),
+            Form::Single => one,
+            Form::List | Form::Names | Form::Repeated => {
+                serde_json::json!({ "anyOf": [one, { "type": "array" }, { "type": "object" }] })
+            }
+        }
+    }
+}
+
+/// One value, written as text.
+pub(super) trait OptionText: Sized {
+    /// Of a list of them.
+    const LIST: Form = Form::Repeated;
+    /// Its type in Python.
+    const PYTHON: &'static str;
+    /// The type of a list of them.
+    const PYTHON_LIST: &'static str = "Sequence[str]";
+    fn words() -> Vec<Word> {
+        Vec::new()
+    }
+    /// Reads it; else what is wrong with it.
+    fn of(text: &str) -> Result<Self, String>;
+    fn text(&self) -> String;
+}
+
+impl OptionValue for bool {
+    const FORM: Form = Form::Flag;
+    const PYTHON: &'static str = "bool";
+
+    fn words() -> Vec<Word> {
+        Vec::new()
+    }
+
+    fn is_given(&self) -> bool {
+        *self
+    }
+
+    fn read(option: &str, value: &Value) -> Result<Self, Error> {
+        value.as_bool().ok_or_else(|| Error::argument(option, format!("{value} is neither true nor false")))
+    }
+
+    fn write(&self) -> Value {
+        Value::Bool(*self)
+    }
+}
+
+impl<T: OptionText> OptionValue for Option<T> {
+    const FORM: Form = Form::Single;
+    const PYTHON: &'static str = T::PYTHON;
+
+    fn words() -> Vec<Word> {
+        T::words()
+    }
+
+    fn is_given(&self) -> bool {
+        self.is_some()
+    }
+
+    fn read(option: &str, value: &Value) -> Result<Self, Error> {
+        T::of(&text(option, value)?).map(Some).map_err(|message| Error::argument(option, message))
+    }
+
+    fn write(&self) -> Value {
+        self.as_ref().map_or(Value::Null, |value| plain(&value.text()))
+    }
+}
+
+impl<T: OptionText> OptionValue for Vec<T> {
+    const FORM: Form = T::LIST;
+    const PYTHON: &'static str = T::PYTHON_LIST;
+
+    fn words() -> Vec<Word> {
+        T::words()
+    }
+
+    fn is_given(&self) -> bool {
+        !self.is_empty()
+    }
+
+    fn read(option: &str, value: &Value) -> Result<Self, Error> {
+        let texts = match value {
+            Value::Array(each) => each.iter().map(|one| text(option, one)).collect::<Result<_, _>>()?,
+            Value::Object(named) => named
+                .iter()
+                .map(|(name, one)| Ok(format!("{name}={}", text(option, one)?)))
+                .collect::<Result<Vec<_>, Error>>()?,
+            one if T::LIST == Form::List => text(option, one)?.split(',').map(str::to_owned).collect(),
+            one => vec![text(option, one)?],
+        };
+        if texts.is_empty() {
+            return Err(Error::argument(option, "there is none; give one at least, or leave it out"));
+        }
+        let read = |text: &String| T::of(text).map_err(|message| Error::argument(option, message));
+        texts.iter().map(read).collect()
+    }
+
+    fn write(&self) -> Value {
+        let texts: Vec<String> = self.iter().map(OptionText::text).collect();
+        let named = |text: &String| {
+            let (name, value) = text.rsplit_once('=').filter(|_| T::PYTHON_LIST.contains("Mapping"))?;
+            Some((name.to_owned(), plain(value)))
+        };
+        match texts.iter().map(named).collect::<Option<Map<_, _>>>() {
+            Some(named) if !named.is_empty() => Value::Object(named),
+            _ => Value::Array(texts.iter().map(|text| plain(text)).collect()),
+        }
+    }
+}
+
+/// One value as text: a range of two ends may be a list of them, either of which may be null.
+fn text(option: &str, value: &Value) -> Result<String, Error> {
+    let number = |number: &Number| match number.as_f64() {
+        // Whole numbers have no point: 2.0 is the order 2, and the norm.
+        Some(whole) if number.is_f64() && whole == whole.trunc() && whole.abs() < 1e15 => format!("{whole}"),
+        _ => number.to_string(),
+    };
+    match value {
+        Value::String(text) => Ok(text.clone()),
+        Value::Number(one) => Ok(number(one)),
+        Value::Array(ends) if ends.len() == 2 => {
+            let end = |end: &Value| match end {
+                Value::Null => Ok(String::new()),
+                end => text(option, end),
+            };
+            Ok(format!("{}..{}", end(&ends[0])?, end(&ends[1])?))
+        }
+        _ => Err(Error::argument(option, format!("{value} is neither a text nor a number"))),
+    }
+}
+
+/// A number where the text is one.
+fn plain(text: &str) -> Value {
+    let whole = text.parse::<u64>().ok().map(Value::from);
+    let number = || text.parse::<f64>().ok().filter(|number| number.is_finite()).map(Value::from);
+    whole.or_else(number).unwrap_or_else(|| Value::from(text))
+}
+
+impl OptionText for String {
+    const LIST: Form = Form::Repeated;
+    const PYTHON: &'static str = "str";
+
+    fn of(text: &str) -> Result<Self, String> {
+        Ok(text.to_owned())
+    }
+
+    fn text(&self) -> String {
+        self.clone()
+    }
+}
+
+/// The name of a column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnName(pub String);
+
+impl OptionText for ColumnName {
+    const LIST: Form = Form::Names;
+    const PYTHON: &'static str = "str";
+
+    fn of(text: &str) -> Result<Self, String> {
+        Ok(Self(text.to_owned()))
+    }
+
+    fn text(&self) -> String {
+        self.0.clone()
+    }
+}
+
+/// The samples that an input waits, or a range of them: they are no coefficients, of which there are so many at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DelayRange(pub OrderRange);
+
+impl OptionText for DelayRange {
+    const LIST: Form = Form::List;
+    const PYTHON: &'static str = "Order";
+    const PYTHON_LIST: &'static str = "Orders";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<usize>().ok();
+        let ends = match text.split_once("..") {
+            Some((first, last)) => number(first).zip(number(last)),
+            None => number(text).map(|delay| (delay, delay)),
+        };
+        let range = ends.and_then(|(first, last)| OrderRange::new(first, last).ok());
+        range.map(Self).ok_or_else(|| format!("'{text}' is no delay; write 2, or a range as 0..10"))
+    }
+
+    fn text(&self) -> String {
+        self.0.to_string()
+    }
+}
+
+impl OptionText for usize {
+    const LIST: Form = Form::List;
+    const PYTHON: &'static str = "int";
+    const PYTHON_LIST: &'static str = "Union[int, Sequence[int]]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        text.trim().parse().map_err(|_| format!("'{text}' is not a whole number; give one such as 2"))
+    }
+
+    fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl OptionText for u64 {
+    const PYTHON: &'static str = "int";
+
+    fn of(text: &str) -> Result<Self, String> {
+        text.trim().parse().map_err(|_| format!("'{text}' is not a whole number; give one such as 2"))
+    }
+
+    fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+impl OptionText for f64 {
+    const PYTHON: &'static str = "float";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let number = text.trim().parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| format!("'{text}' is not a finite number"))
+    }
+
+    fn text(&self) -> String {
+        self.to_string()
+    }
+}
+
+/// A number for a channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedValue {
+    /// The channel.
+    pub name: String,
+    /// Its number.
+    pub value: f64,
+}
+
+impl OptionText for NamedValue {
+    const PYTHON: &'static str = "str";
+    const PYTHON_LIST: &'static str = "Mapping[str, float]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let (name, value) = text.rsplit_once('=').unwrap_or_default();
+        let value = value.trim().parse().ok().filter(|value: &f64| value.is_finite());
+        let value = value.ok_or_else(|| format!("'{text}': write it as NAME=VALUE, such as u=4.5"))?;
+        Ok(Self { name: name.to_owned(), value })
+    }
+
+    fn text(&self) -> String {
+        format!("{}={}", self.name, self.value)
+    }
+}
+
+/// Values that read and write themselves, how a list of them stands on a command line, and their types in Python.
+macro_rules! texts {
+    ($($own:ty, $list:ident, $python:literal, $python_list:literal;)*) => {$(
+        impl OptionText for $own {
+            const LIST: Form = Form::$list;
+            const PYTHON: &'static str = $python;
+            const PYTHON_LIST: &'static str = $python_list;
+
+            fn of(text: &str) -> Result<Self, String> {
+                text.parse().map_err(|error| match error {
+                    Error::Argument { message, .. } => message,
+                    other => other.to_string(),
+                })
+            }
+
+            fn text(&self) -> String {
+                self.to_string()
+            }
+        }
+    )*};
+}
+
+texts! {
+    Bound, Repeated, "str", "Mapping[str, Bound]";
+    Detrend, Repeated, "Union[Literal[\"mean\", \"linear\", \"none\"], str]", "Sequence[str]";
+    Focus, Repeated, "Union[int, Literal[\"auto\", \"prediction\", \"simulation\"]]", "Sequence[str]";
+    GainBound, Repeated, "str", "Union[Bound, Mapping[str, Bound]]";
+    OrderRange, List, "Order", "Orders";
+    Prefilter, Repeated, "Band", "Sequence[str]";
+    ProcessStructure, List, "str", "Union[str, Sequence[str]]";
+    Refine, Repeated, "Literal[\"prediction\", \"simulation\"]", "Sequence[str]";
+    Rows, List, "str", "Rows";
+    Split, Repeated, "Union[str, tuple[float, float, float]]", "Sequence[str]";
+    Weighting, Repeated, "Literal[\"ssarx\", \"moesp\", \"n4sid\", \"cva\"]", "Sequence[str]";
+}
+
+impl OptionText for Select {
+    const PYTHON: &'static str = "";
+
+    fn words() -> Vec<Word> {
+        Self::all().map(|select| Word { word: select.word(), alias: None, help: select.says() }).collect()
+    }
+
+    fn of(text: &str) -> Result<Self, String> {
+        Self::all().find(|select| select.word() == text).ok_or_else(|| none_of(text, &Self::words()))
+    }
+
+    fn text(&self) -> String {
+        self.word().to_owned()
+    }
+}
+
+/// What is wrong with a word that is none of these.
+pub(super) fn none_of(text: &str, words: &[Word]) -> String {
+    let words: Vec<&str> = words.iter().map(|own| own.word).collect();
+    format!("'{text}' is none of {}", words.join(", "))
+}

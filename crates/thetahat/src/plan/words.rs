@@ -1,0 +1,315 @@
+//! Options whose values are words, each with what it means.
+
+use thetahat_numerics::optimize::Algorithm;
+
+use super::value::{OptionText, Word, none_of};
+use crate::estimate::{Constant, Initial, Loss};
+use crate::model::Membership;
+use crate::select::Path;
+
+/// The words of a type, one for each of its variants.
+macro_rules! words {
+    ($own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
+        impl $own {
+            /// As it is written.
+            pub(crate) fn word(self) -> &'static str {
+                match self { $(Self::$variant => $word,)* }
+            }
+        }
+        words!(of $own { $($variant $word $(| $alias)? $help,)* });
+    };
+    (alias) => { None };
+    (alias $alias:literal) => { Some($alias) };
+    (of $own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
+        impl OptionText for $own {
+            const PYTHON: &'static str = "";
+
+            fn words() -> Vec<Word> {
+                vec![$(Word { word: $word, alias: words!(alias $($alias)?), help: $help },)*]
+            }
+
+            fn of(text: &str) -> Result<Self, String> {
+                match text {
+                    $($word $(| $alias)? => Ok(Self::$variant),)*
+                    other => Err(none_of(other, &Self::words())),
+                }
+            }
+
+            fn text(&self) -> String {
+                match self { $(Self::$variant => $word,)* }.to_owned()
+            }
+        }
+    };
+}
+
+/// The structure of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ModelWord {
+    /// A y = B u + e.
+    Arx,
+    /// A y = B u + C e.
+    Armax,
+    /// A y = C e.
+    Arma,
+    /// A y = e.
+    Ar,
+    /// y = B/F u + e.
+    Oe,
+    /// y = B/F u + C/D e.
+    Bj,
+    /// A y = B/F u + C/D e.
+    General,
+    /// An impulse response.
+    Fir,
+    /// A process in continuous time.
+    Process,
+    /// Transfer functions in continuous time.
+    Tf,
+    /// State space.
+    Ss,
+}
+
+words! { ModelWord {
+    Arx "arx" "A y = B u + e",
+    Armax "armax" "A y = B u + C e",
+    Arma "arma" "A y = C e: a time series",
+    Ar "ar" "A y = e: a time series",
+    Oe "oe" "Output error: y = B/F u + e",
+    Bj "bj" "Box and Jenkins: y = B/F u + C/D e",
+    General "general" "A y = B/F u + C/D e, with any of them",
+    Fir "fir" "An impulse response: y = B u + e of many taps, with `taps`",
+    Process "process" "A process in continuous time: gain, lags, dead time, with `structure`",
+    Tf "tf" "Transfer functions in continuous time, with `np` and `nz`",
+    Ss "ss" "State space: x(t+1) = F x + G u + K e, y = H x + D u + e, with any number of outputs",
+}}
+
+/// Which past outputs an output depends on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CoupleWord {
+    /// Those of all.
+    Full,
+    /// Its own.
+    None,
+    /// The data say it.
+    Auto,
+}
+
+words! { of CoupleWord {
+    Full "full" "Those of all",
+    None "none" "Its own",
+    Auto "auto" "What has the least MDL",
+}}
+
+/// What is known of an impulse response before the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KernelWord {
+    /// Decay and smoothness.
+    Dc,
+    /// One number for both.
+    Tc,
+    /// Nothing.
+    None,
+}
+
+words! { of KernelWord {
+    Dc "dc" "Decay and smoothness each have a number of their own, which the likelihood says",
+    Tc "tc" "One number for both",
+    None "none" "Nothing: least squares",
+}}
+
+/// How to estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MethodWord {
+    /// Prediction errors.
+    #[default]
+    Pem,
+    /// Instrumental variables.
+    Iv,
+    /// Refined instrumental variables.
+    Sriv,
+}
+
+words! { of MethodWord {
+    Pem "pem" "Least squared prediction errors: in one step where that is least squares, else by a search",
+    Iv "iv" "Instrumental variables in four stages: A and B of an arx model, whatever the noise",
+    Sriv "sriv" "Refined instrumental variables: B and F of an oe model, whatever the noise",
+}}
+
+/// Which likelihood is made large.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LikelihoodWord {
+    /// Given the first samples.
+    #[default]
+    Conditional,
+    /// Of all outputs.
+    Exact,
+}
+
+words! { of LikelihoodWord {
+    Conditional "conditional" "Given the samples that the first error needs: least squared prediction errors",
+    Exact "exact" "Of all measured outputs, by the Kalman filter (ar, arma, arx, armax)",
+}}
+
+words! { of Initial {
+    Auto "auto" "drop without F; with F estimate where rows stand before, or it is worth its parameters, else zero",
+    Drop "drop" "What was measured before; where nothing was, samples without a full regressor are left out (models without F)",
+    Zero "zero" "Zeros",
+    Estimate "estimate" "What was measured before, and what fits best, found with the parameters (models with F, processes, or \
+        `likelihood` exact with inputs)",
+}}
+
+words! { of Constant {
+    Auto "auto" "Where it lowers MDL, unless the output's offset is given (`detrend` none, `offset`)",
+    Yes "yes" "Always",
+    No "no" "Never",
+}}
+
+/// Whether inputs act at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FeedthroughWord {
+    /// The data say it.
+    #[default]
+    Auto,
+    /// They do.
+    Yes,
+    /// They do not.
+    No,
+}
+
+words! { of FeedthroughWord {
+    Auto "auto" "The data say it",
+    Yes "yes" "They do: D is estimated",
+    No "no" "They do not: D is zero",
+}}
+
+/// The functions of a nonlinear ARX model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MapWord {
+    /// Products.
+    Poly,
+    /// Radial basis functions.
+    Rbf,
+    /// Splines.
+    Spline,
+    /// Local linear models.
+    Local,
+    /// Nearest samples.
+    Knn,
+    /// Hyperbolic tangents.
+    Tanh,
+    /// Logistic functions.
+    Logistic,
+    /// Ramps.
+    Relu,
+    /// Steps.
+    Step,
+    /// Radial basis functions that are trained.
+    RbfFree,
+    /// The data say it.
+    Auto,
+    /// A linear model.
+    None,
+}
+
+words! { MapWord {
+    Poly "poly" "Products of regressors up to a degree",
+    Rbf "rbf" "Radial basis functions",
+    Spline "spline" "A natural cubic spline of each regressor",
+    Local "local" "Local linear models, grown by splitting the space of the regressors",
+    Knn "knn" "The nearest samples of the fit",
+    Tanh "tanh" "A network with one hidden layer of hyperbolic tangents",
+    Logistic "logistic" "A network of logistic functions",
+    Relu "relu" | "hinge" "A network of ramps, max(0, a); beside a linear path they are hinges",
+    Step "step" "A network of steps, whose hidden weights are drawn",
+    RbfFree "rbf-free" "Radial basis functions whose centres and widths are trained",
+    Auto "auto" "Of polynomials and networks the one with the best free run on rows held out",
+    None "none" "A linear model, where the data choose",
+}}
+
+words! { of Membership {
+    Rectangle "rectangle" "Each in its box alone",
+    Trapezoid "trapezoid" "Sloping edges, which overlap",
+    Gaussian "gaussian" "Gaussians, over their sum",
+}}
+
+words! { of Path {
+    All "all" "Every combination of orders",
+    Alternate "alternate" "One order up at a time, each in its turn",
+}}
+
+words! { of Algorithm {
+    LevenbergMarquardt "lm" "Levenberg and Marquardt",
+    GaussNewton "gauss-newton" "Gauss and Newton, the step halved until the cost falls",
+    Newton "newton" "Newton and Raphson with the full Hessian",
+    Gradient "gradient" "Steepest descent",
+    Annealing "annealing" "Simulated annealing, then lm from the best point that it met",
+}}
+
+/// What is made small.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NormOption {
+    /// The sum of squares.
+    Two,
+    /// The sum of absolute values.
+    One,
+    /// The largest absolute value.
+    Infinity,
+    /// Squares up to k times the scale of the errors, absolute values beyond.
+    Huber {
+        /// k, above 0.
+        k: f64,
+    },
+}
+
+impl OptionText for NormOption {
+    const PYTHON: &'static str = "Union[float, Literal[\"huber\", \"inf\"], str]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let k = |text: &str| text.trim().parse().ok().filter(|k: &f64| k.is_finite() && *k > 0.0);
+        match (text, text.strip_prefix("huber:").map(k)) {
+            ("2", _) => Ok(Self::Two),
+            ("1", _) => Ok(Self::One),
+            ("inf", _) => Ok(Self::Infinity),
+            ("huber", _) => Ok(Self::Huber { k: Loss::K }),
+            (_, Some(Some(k))) => Ok(Self::Huber { k }),
+            _ => Err(format!("'{text}': give 2, 1, huber, huber:K with K above 0, or inf")),
+        }
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::Two => "2".to_owned(),
+            Self::One => "1".to_owned(),
+            Self::Infinity => "inf".to_owned(),
+            Self::Huber { k } => format!("huber:{k}"),
+        }
+    }
+}
+
+/// C1 or C1,C2: the length of the steps of a gradient search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepOption {
+    /// Above 0.
+    pub c1: f64,
+    /// Above 0.
+    pub c2: Option<f64>,
+}
+
+impl OptionText for StepOption {
+    const PYTHON: &'static str = "Union[float, tuple[float, float]]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let number =
+            |text: &str| text.trim().parse().ok().filter(|value: &f64| value.is_finite() && *value > 0.0);
+        let constants = match text.split_once(',') {
+            None => number(text).map(|c1| Self { c1, c2: None }),
+            Some((c1, c2)) => number(c1).zip(number(c2)).map(|(c1, c2)| Self { c1, c2: Some(c2) }),
+        };
+        constants
+            .ok_or_else(|| format!("'{text}': write it as C1 or C1,C2, positive numbers, such as 0.5 or 1,2"))
+    }
+
+    fn text(&self) -> String {
+        self.c2.map_or_else(|| self.c1.to_string(), |c2| format!("{},{c2}", self.c1))
+    }
+}

@@ -1,0 +1,469 @@
+"""The options of fits, written from the one table of options: ``cargo run -p thetahat --example python_options``."""
+
+from collections.abc import Mapping, Sequence
+from typing import Literal, Optional, TypedDict, Union
+
+from thetahat.engine.values import Band, Bound, Rows
+
+
+class FitOptions(TypedDict, total=False):
+    """What every fit of a model of polynomials can be told, beside the orders.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    detrend
+        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
+        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
+        mean]
+    offset
+        Set a channel's offset by hand
+    prefilter
+        Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through
+        one Butterworth filter; the model and its figures are of the signals as they are
+    likelihood
+        Which likelihood to make large, given the first samples or of all of them: exact goes on through
+        missing outputs (models without D and F); ``"conditional"``: Given the samples that the first error
+        needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the Kalman filter
+        (ar, arma, arx, armax) [default: conditional]
+    initial
+        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
+        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
+        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
+        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
+        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+    focus
+        What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
+        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
+        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
+        inputs [default: auto]
+    constant
+        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
+        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
+    trend
+        Estimate a slope of the output with the parameters too, and its level with it: for drift
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    search
+        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
+        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        that it met [default: lm]
+    max_iterations
+        Iterations at most, from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    starts
+        Search from this many further starts [default: 0, with ``narx`` 4]
+    seed
+        Which random starts, or which random centres [default: 0]
+    time_limit
+        After so long begin no iteration, and look for no further start
+    norm
+        What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
+        rule; huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K =
+        1.345 if not said); inf, the largest error [default: 2]
+    bound
+        Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
+    dc_gain
+        Keep the static gain from an input in a range, or at a value
+    ridge
+        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+    noise_bound
+        Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "linear", "none"], str]]
+    offset: Optional[Mapping[str, float]]
+    prefilter: Optional[Band]
+    likelihood: Optional[Literal["conditional", "exact"]]
+    initial: Optional[Literal["auto", "drop", "zero", "estimate"]]
+    focus: Optional[Union[int, Literal["auto", "prediction", "simulation"]]]
+    constant: Optional[Literal["auto", "yes", "no"]]
+    trend: Optional[bool]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    starts: Optional[int]
+    seed: Optional[int]
+    time_limit: Optional[float]
+    norm: Optional[Union[float, Literal["huber", "inf"], str]]
+    bound: Optional[Mapping[str, Bound]]
+    dc_gain: Optional[Union[Bound, Mapping[str, Bound]]]
+    ridge: Optional[float]
+    noise_bound: Optional[float]
+
+
+class ImpulseResponseOptions(TypedDict, total=False):
+    """What a fit of an impulse response can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    detrend
+        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
+        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
+        mean]
+    offset
+        Set a channel's offset by hand
+    prefilter
+        Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through
+        one Butterworth filter; the model and its figures are of the signals as they are
+    likelihood
+        Which likelihood to make large, given the first samples or of all of them: exact goes on through
+        missing outputs (models without D and F); ``"conditional"``: Given the samples that the first error
+        needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the Kalman filter
+        (ar, arma, arx, armax) [default: conditional]
+    initial
+        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
+        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
+        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
+        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
+        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+    focus
+        What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
+        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
+        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
+        inputs [default: auto]
+    constant
+        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
+        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
+    trend
+        Estimate a slope of the output with the parameters too, and its level with it: for drift
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    norm
+        What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
+        rule; huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K =
+        1.345 if not said); inf, the largest error [default: 2]
+    bound
+        Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
+    dc_gain
+        Keep the static gain from an input in a range, or at a value
+    ridge
+        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+    noise_bound
+        Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "linear", "none"], str]]
+    offset: Optional[Mapping[str, float]]
+    prefilter: Optional[Band]
+    likelihood: Optional[Literal["conditional", "exact"]]
+    initial: Optional[Literal["auto", "drop", "zero", "estimate"]]
+    focus: Optional[Union[int, Literal["auto", "prediction", "simulation"]]]
+    constant: Optional[Literal["auto", "yes", "no"]]
+    trend: Optional[bool]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    norm: Optional[Union[float, Literal["huber", "inf"], str]]
+    bound: Optional[Mapping[str, Bound]]
+    dc_gain: Optional[Union[Bound, Mapping[str, Bound]]]
+    ridge: Optional[float]
+    noise_bound: Optional[float]
+
+
+class StateSpaceOptions(TypedDict, total=False):
+    """What a fit of a model in state space can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    detrend
+        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
+        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
+        mean]
+    offset
+        Set a channel's offset by hand
+    initial
+        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
+        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
+        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
+        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
+        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+    focus
+        What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
+        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
+        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
+        inputs [default: auto]
+    constant
+        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
+        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
+    past
+        Past samples that the states are made of [default: those of the least AIC, 40 at most]
+    future
+        Future samples that the states are to tell of [default: as many as past ones]
+    weighting
+        Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future
+        inputs [default: ssarx]
+    feedthrough
+        Whether inputs act on the outputs in the same sample [default: auto]
+    refine
+        Search from there for the least errors one step ahead (prediction) or of the free run (simulation):
+        poles, gains and responses then have standard errors
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    search
+        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
+        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        that it met [default: lm]
+    max_iterations
+        Iterations at most, from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    time_limit
+        After so long begin no iteration, and look for no further start
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "linear", "none"], str]]
+    offset: Optional[Mapping[str, float]]
+    initial: Optional[Literal["auto", "drop", "zero", "estimate"]]
+    focus: Optional[Union[int, Literal["auto", "prediction", "simulation"]]]
+    constant: Optional[Literal["auto", "yes", "no"]]
+    past: Optional[int]
+    future: Optional[int]
+    weighting: Optional[Literal["ssarx", "moesp", "n4sid", "cva"]]
+    feedthrough: Optional[bool]
+    refine: Optional[Literal["prediction", "simulation"]]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    time_limit: Optional[float]
+
+
+class ProcessOptions(TypedDict, total=False):
+    """What a fit of a process in continuous time can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    offset
+        Set a channel's offset by hand
+    initial
+        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
+        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
+        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
+        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
+        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+    trend
+        Estimate a slope of the output with the parameters too, and its level with it: for drift
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    search
+        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
+        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        that it met [default: lm]
+    max_iterations
+        Iterations at most, from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    starts
+        Search from this many further starts [default: 0, with ``narx`` 4]
+    time_limit
+        After so long begin no iteration, and look for no further start
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    offset: Optional[Mapping[str, float]]
+    initial: Optional[Literal["auto", "drop", "zero", "estimate"]]
+    trend: Optional[bool]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    starts: Optional[int]
+    time_limit: Optional[float]
+
+
+class NarxOptions(TypedDict, total=False):
+    """What a fit of a nonlinear ARX model can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    detrend
+        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
+        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
+        mean]
+    offset
+        Set a channel's offset by hand
+    focus
+        What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
+        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
+        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
+        inputs [default: auto]
+    regressors
+        An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it;
+        once for each
+    degree
+        Factors of a product at most (poly) [default: 2]
+    terms
+        How many functions to take; or products by name, as ``Model.parameter_names`` has them [default: as
+        ``select`` says, by the free run on validation rows, or on blocks of the estimation rows]
+    most_terms
+        How many functions to look at [default: 40, and 10 local models]
+    centres
+        Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a
+        grid of N in each direction, or at N pseudo-random points [default: chosen]
+    width
+        sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so
+        that neighbours overlap]
+    linear
+        Whether a constant and the regressors themselves stand beside radial basis functions (rbf); whether
+        local models, and what neighbours say, are planes (local, knn)
+    membership
+        How local models share the space of the regressors (local); ``"rectangle"``: Each in its box alone;
+        ``"trapezoid"``: Sloping edges, which overlap; ``"gaussian"``: Gaussians, over their sum [default:
+        gaussian]
+    units
+        Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours
+        (knn); bends of each regressor (spline), 5 if not said; units that are drawn (step, ``drawn``), 100
+        if not said [default: chosen]
+    drawn
+        Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu);
+        else they are trained. Those of step are always drawn
+    raw_terms
+        Leave signals in their own units: else each is divided by its standard deviation
+    select
+        What makes one model better than another; ``"fpe"``: Akaike's final prediction error; ``"aic"``:
+        Akaike's information criterion; ``"aicc"``: The same, corrected for few samples; ``"mdl"``:
+        Rissanen's minimum description length; ``"hqc"``: Hannan and Quinn's criterion, between AIC and MDL;
+        ``"validation"``: The smallest model within 1 % of the least cost on the validation rows; ``"cv"``:
+        The same by cross-validation over five blocks in time [default: mdl]
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    search
+        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
+        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        that it met [default: lm]
+    max_iterations
+        Iterations at most, from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    starts
+        Search from this many further starts [default: 0, with ``narx`` 4]
+    seed
+        Which random starts, or which random centres [default: 0]
+    time_limit
+        After so long begin no iteration, and look for no further start
+    ridge
+        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "linear", "none"], str]]
+    offset: Optional[Mapping[str, float]]
+    focus: Optional[Union[int, Literal["auto", "prediction", "simulation"]]]
+    regressors: Optional[Sequence[str]]
+    degree: Optional[int]
+    terms: Optional[Union[int, Sequence[str]]]
+    most_terms: Optional[int]
+    centres: Optional[str]
+    width: Optional[float]
+    linear: Optional[bool]
+    membership: Optional[Literal["rectangle", "trapezoid", "gaussian"]]
+    units: Optional[int]
+    drawn: Optional[bool]
+    raw_terms: Optional[bool]
+    select: Optional[Literal["fpe", "aic", "aicc", "mdl", "hqc", "validation", "cv"]]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    starts: Optional[int]
+    seed: Optional[int]
+    time_limit: Optional[float]
+    ridge: Optional[float]
+
+
+class EquationsOptions(TypedDict, total=False):
+    """What a fit of a model in equations can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+    search
+        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
+        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        that it met [default: lm]
+    max_iterations
+        Iterations at most, from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    starts
+        Search from this many further starts [default: 0, with ``narx`` 4]
+    seed
+        Which random starts, or which random centres [default: 0]
+    time_limit
+        After so long begin no iteration, and look for no further start
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    starts: Optional[int]
+    seed: Optional[int]
+    time_limit: Optional[float]

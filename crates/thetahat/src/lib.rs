@@ -96,6 +96,7 @@ pub mod filter;
 pub mod inspect;
 pub mod model;
 pub mod optimize;
+#[cfg(feature = "present")]
 pub mod present;
 pub mod report;
 pub mod respond;

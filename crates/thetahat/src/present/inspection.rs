@@ -1,7 +1,7 @@
 //! Inspections: what a log is worth, before any fit.
 
 use crate::data::{Finding, FindingKind};
-use crate::figures::{chance, fixed, number, seconds, short};
+use crate::figures::{chance, fixed, number, seconds, short, three};
 use crate::inspect::{ChannelQuality, Excitation, Inspection, SpectrumPoint};
 use crate::present::Layout;
 use crate::text::{brief, harmless};
@@ -10,7 +10,7 @@ use super::charts::{self, Stack};
 use super::data;
 use super::html::Page;
 use super::outputs::points;
-use super::tree::{Cell, Medium, Sections, columns, figure, known, word};
+use super::tree::{Cell, Medium, Sections, columns, figure, known, word, written};
 
 /// This many channels, and warnings, are shown of very many: in a text, and on a page.
 const MOST: usize = 10;
@@ -152,6 +152,11 @@ fn name(on: &Sections, name: &str) -> Cell {
     word(if on.is_page() { name.to_owned() } else { brief(name, 24) })
 }
 
+/// A share in percent.
+fn share(share: impl Into<Option<f64>>) -> Cell {
+    written(share, [|share| fixed(100.0 * share, 1), |share| three(100.0 * share)])
+}
+
 /// The values and the quality of the channels that matter most.
 fn channels(on: &mut Sections, inspection: &Inspection, brief: &Inspection) {
     let head = ["channel", "role", "minimum", "maximum", "mean", "deviation", "trend [1/s]", "[%]"];
@@ -175,7 +180,7 @@ fn channels(on: &mut Sections, inspection: &Inspection, brief: &Inspection) {
         let ChannelQuality { minimum, maximum, mean, standard_deviation, trend, .. } = channel;
         let numbers = [minimum, maximum, mean, standard_deviation, trend];
         let own = [name(on, &channel.name), word(channel.role.clone().unwrap_or_default())];
-        let share = figure(channel.trend_share, |share| fixed(100.0 * share, 1));
+        let share = share(channel.trend_share);
         let numbers = numbers.map(|value| figure(*value, number));
         values.row(own.into_iter().chain(numbers).chain([share]));
         let rows: Vec<String> = channel.outliers.iter().take(3).map(usize::to_string).collect();
@@ -232,7 +237,7 @@ fn inputs(on: &mut Sections, inspection: &Inspection) {
         table.row([
             name(on, &excitation.input),
             word(order(excitation)),
-            figure(100.0 * excitation.changes, |share| fixed(share, 1)),
+            share(excitation.changes),
             figure(half_power(&excitation.spectrum), number),
             known(delay.and_then(|delay| delay.nk), |nk| nk.to_string()),
             // No rounding up to certainty.

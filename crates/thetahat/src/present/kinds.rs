@@ -10,6 +10,7 @@ mod state_space;
 
 use super::charts;
 use super::fits::fits;
+use super::selection::selection;
 use super::tree::{Cell, Sections, columns, known, word};
 use super::words::{quantity, signal};
 use crate::model::{LinearModel, Model, Quantity, Signal};
@@ -19,6 +20,14 @@ pub(super) use polynomial::parameters;
 
 /// Appends what a report says of its model. `converted` is a model that has no figures of a fit.
 pub(super) fn present(on: &mut Sections, report: &Report, converted: bool) {
+    let is_chosen = match &report.model {
+        Model::Polynomial(_) | Model::Process(_) => true,
+        Model::StateSpace(_) => !converted && report.selection.is_some(),
+        _ => false,
+    };
+    if is_chosen || on.is_page() {
+        selection(on, report);
+    }
     match &report.model {
         Model::Polynomial(model) => polynomial::present(on, report, model),
         Model::Equations(model) => equations::present(on, report, model),

@@ -200,7 +200,7 @@ fn anderson<'a>(
 }
 
 fn level(alpha: Option<f64>) -> String {
-    alpha.map_or_else(String::new, |alpha| format!("at {}", short(alpha)))
+    alpha.map_or_else(|| "verdict".to_owned(), |alpha| format!("at {}", short(alpha)))
 }
 
 fn stops(residuals: &Residuals) -> String {

@@ -193,12 +193,17 @@ pub(super) fn word(word: impl ToString) -> Cell {
 
 /// A number and how it is written, where it is known.
 pub(super) fn figure(value: impl Into<Option<f64>>, written: fn(f64) -> String) -> Cell {
-    value.into().map_or(Cell::Unknown, |value| Cell::Figure(value, [written; 2]))
+    self::written(value, [written; 2])
+}
+
+/// The same where a page writes it otherwise.
+pub(super) fn written(value: impl Into<Option<f64>>, written: [fn(f64) -> String; 2]) -> Cell {
+    value.into().map_or(Cell::Unknown, |value| Cell::Figure(value, written))
 }
 
 /// A standard error: where figures end at one line each has its power of ten.
 pub(super) fn error(value: impl Into<Option<f64>>) -> Cell {
-    value.into().map_or(Cell::Unknown, |value| Cell::Figure(value, [figures::error, figures::three]))
+    written(value, [figures::error, figures::three])
 }
 
 /// What is said of a value, where it is known.

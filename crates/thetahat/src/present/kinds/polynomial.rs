@@ -5,7 +5,6 @@ use super::{closing, responses, signals};
 use crate::figures::{number, of_unit, seconds};
 use crate::model::{Parameter, PolynomialModel, Quantity, Root};
 use crate::present::charts;
-use crate::present::selection::selection;
 use crate::present::tree::{Sections, Table, columns, error, figure, known, word};
 use crate::present::words::{complex, formula, interval, quantity, spread, stable};
 use crate::report::Report;
@@ -17,7 +16,6 @@ const NO_ROOT_ERROR: &str =
     "no standard error is known, or no time constant goes with a pole on or outside of the unit circle";
 
 pub(super) fn present(on: &mut Sections, report: &Report, model: &PolynomialModel) {
-    selection(on, report);
     on.section("Model");
     on.line(format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));
     signals(on, &model.inputs, std::slice::from_ref(&model.output));
@@ -60,17 +58,22 @@ fn dynamics(on: &mut Sections, model: &PolynomialModel) {
     for (pole, time) in model.poles.iter().zip(&model.time_constants) {
         add("pole", pole, Some(*time));
     }
-    // Those of an impulse response say nothing: it ends where its taps do.
+    // Those of an impulse response say little: it ends where its taps do.
     let ends = model.orders.na == 0 && model.orders.nf.iter().all(|&nf| nf == 0);
-    model.zeros.iter().flatten().filter(|_| !ends).for_each(|zero| add("zero", zero, None));
+    model.zeros.iter().flatten().filter(|_| on.is_page() || !ends).for_each(|zero| add("zero", zero, None));
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
     model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
     if !roots.rows.is_empty() {
         on.table(roots);
     }
+    static_gains(on, model);
+    on.line(stable(model.stable));
+}
+
+/// The static gain from each input.
+pub(super) fn static_gains(on: &mut Sections, model: &PolynomialModel) {
     for (input, gain) in model.inputs.iter().zip(&model.dc_gain) {
         let gain = gain.map_or_else(|| "none (integrator)".to_owned(), quantity);
         on.line(format!("from {}: DC gain {gain}", harmless(&input.name)));
     }
-    on.line(stable(model.stable));
 }

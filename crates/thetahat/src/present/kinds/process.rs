@@ -1,17 +1,15 @@
 //! Processes.
 
-use super::polynomial::NO_ERROR;
+use super::polynomial::{NO_ERROR, static_gains};
 use super::procedure::{procedure, samples};
 use super::{closing, responses, signals};
 use crate::figures::{number, seconds, unit_of};
-use crate::model::ProcessModel;
-use crate::present::selection::selection;
+use crate::model::{LinearModel, ProcessModel};
 use crate::present::tree::{Sections, columns, error, figure, word};
 use crate::report::Report;
 use crate::text::harmless;
 
 pub(super) fn present(on: &mut Sections, report: &Report, model: &ProcessModel) {
-    selection(on, report);
     on.section("Model");
     on.line(format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
     for (structure, input) in model.structures.iter().zip(&model.inputs) {
@@ -41,6 +39,13 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &ProcessModel) 
         samples(on, &report.estimation, model.noise_variance, &model.output);
     }
     procedure(on, report);
+    if on.is_page() {
+        for linear in report.model.linear("a gain").into_iter().flatten() {
+            if let LinearModel::Transfer(linear) = linear {
+                static_gains(on, &linear);
+            }
+        }
+    }
     responses(on, report, false);
     if !of_points {
         closing(on, report);

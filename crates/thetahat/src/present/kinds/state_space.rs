@@ -6,7 +6,6 @@ use crate::estimate::{SubspaceOutcome, VectorArxOutcome};
 use crate::figures::{fixed, number, of_unit, seconds, three};
 use crate::model::{Quantity, StateSpaceModel};
 use crate::present::charts;
-use crate::present::selection::selection;
 use crate::present::tree::{Sections, columns, figure, known, word};
 use crate::present::words::{complex, criteria, interval, quantity, spread, stable};
 use crate::report::Report;
@@ -28,9 +27,6 @@ const EQUATION: &str = "x(t+1) = F x + G u + K e, y = H x + D u + e";
 /// Of a model that was `converted` a text has what follows from its matrices.
 pub(super) fn present(on: &mut Sections, report: &Report, model: &StateSpaceModel, converted: bool) {
     let is_fit = !converted;
-    if is_fit && report.selection.is_some() {
-        selection(on, report);
-    }
     let estimation = &report.estimation;
     on.section("Model");
     on.line(format!("{}, sample time {}", report.model.name(), seconds(model.sample_time)));
@@ -143,9 +139,14 @@ fn poles(on: &mut Sections, model: &StateSpaceModel) {
     if !model.poles.is_empty() {
         on.table(table);
     }
-    if on.is_page() && !model.predictor_poles.is_empty() {
-        let all: Vec<String> = model.predictor_poles.iter().map(complex).collect();
-        on.line(format!("poles of the predictor: {}", all.join(", ")));
+    let head = ["pole", "standard error", "modulus"];
+    let mut table = columns("Poles of the predictor", head).none("no standard error is known");
+    for pole in &model.predictor_poles {
+        let modulus = figure(pole.re.hypot(pole.im), number);
+        table.row([word(complex(pole)), known(spread(pole), |spread| spread), modulus]);
+    }
+    if on.is_page() {
+        on.table(table);
     }
 }
 

@@ -593,12 +593,11 @@ fn libraries_name_no_options() {
 
 /// Where the variants of `Model` and of `Procedure` may be named: beside what they are, where a fit makes one, and
 /// where each kind has a presentation and a form of its own. All others ask for what a kind can do.
-const KINDS: [&str; 11] = [
+const KINDS: [&str; 10] = [
     "estimate",
     "export",
     "model",
-    "present::pages",
-    "present::tables",
+    "present::kinds",
     "report::equations",
     "report::nonlinear_arx",
     "report::nonlinear_choice",

@@ -100,6 +100,7 @@ pub mod inspect;
 pub mod model;
 pub mod optimize;
 pub mod plan;
+#[cfg(feature = "present")]
 pub mod present;
 pub mod report;
 pub mod respond;

@@ -1,13 +1,13 @@
-//! Documents for people: as tables of text, and as pages.
+//! Documents for people: as tables of text, and as pages, with the feature `present`.
 //!
-//! - With the feature `tables`, [`tables`] has a function for each document, which writes it as lines of text in a
-//!   [`Layout`].
-//! - With the feature `html`, `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`,
-//!   `step_test_page`, `transient_page` (of a `Transient`) and `tuning_page` make one file of HTML that loads nothing,
-//!   with charts that can be zoomed.
+//! - [`tables`] has a function for each document, which writes it as lines of text in a [`Layout`].
+//! - `fit_page`, `validation_page`, `comparison_page`, `inspection_page`, `response_page`, `step_test_page`,
+//!   `transient_page` (of a `Transient`) and `tuning_page` make one file of HTML that loads nothing, with charts that
+//!   can be zoomed.
+//!
+//! Both draw the same tree of sections, sentences and tables, which each kind of document makes once.
 //!
 //! ```
-//! # #[cfg(feature = "tables")] {
 //! use thetahat::data::{Channel, Log};
 //! use thetahat::model::Orders;
 //! use thetahat::present::{Layout, tables};
@@ -20,22 +20,60 @@
 //! let report = identify(log, &[], &Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1])?))?;
 //! let shown = tables::report(&report, Layout::default());
 //! assert!(shown.lines().all(|line| line.chars().count() <= 80) && shown.contains("b1"));
-//! # }
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
-#[cfg(feature = "html")]
-mod pages;
-#[cfg(feature = "tables")]
-pub mod tables;
-#[cfg(any(feature = "html", feature = "tables"))]
+mod charts;
+mod control;
+mod data;
+mod design;
+mod filtered;
+mod fit;
+mod fits;
+mod html;
+mod inspection;
+mod kinds;
+mod outputs;
+mod reduction;
+mod residuals;
+mod response;
+mod selection;
+mod step_test;
+mod text;
+mod topics;
+mod tracking;
+mod tree;
+mod tuning;
+mod validation;
 mod words;
 
-#[cfg(feature = "html")]
-pub use pages::{
-    Transient, comparison_page, fit_page, inspection_page, response_page, step_test_page, transient_page,
-    tuning_page, validation_page,
+pub use self::{
+    charts::Transient,
+    fit::fit_page,
+    inspection::inspection_page,
+    response::response_page,
+    step_test::{step_test_page, transient_page},
+    tuning::tuning_page,
+    validation::{comparison_page, validation_page},
 };
+
+/// Documents as tables of text.
+pub mod tables {
+    pub use super::control::control;
+    pub use super::design::{experiment_design, test_signal};
+    pub use super::filtered::filtered;
+    pub use super::fit::{converted, report};
+    pub use super::fits::figure;
+    pub use super::inspection::inspection;
+    pub use super::reduction::hankel_singular_values;
+    pub use super::response::response;
+    pub use super::step_test::step_test;
+    pub use super::text::wrapped;
+    pub use super::topics::topics;
+    pub use super::tracking::tracking;
+    pub use super::tuning::tuning;
+    pub use super::validation::{comparison, validation};
+}
 
 /// How text is laid out.
 #[derive(Debug, Clone, Copy)]

@@ -57,7 +57,7 @@ impl Source {
 
     /// Seconds from the beginning of 1970 to the first time, as the clocks on the wall of its zone show it. None where
     /// times are no dates.
-    #[cfg(feature = "html")]
+    #[cfg(feature = "present")]
     pub(crate) fn wall_seconds(&self) -> Option<f64> {
         let wall = Start::of(self.start.as_deref()?)?.wall;
         Some(jiff::tz::Offset::UTC.to_timestamp(wall).ok()?.as_nanosecond() as f64 / 1e9)

@@ -56,7 +56,7 @@ impl LinearModel<'_> {
     }
 
     /// The modulus nearest to 1 of its poles, as a distance from there; 1 without any.
-    #[cfg(feature = "html")]
+    #[cfg(feature = "present")]
     pub(crate) fn slowest(&self) -> f64 {
         let roots = match self {
             Self::Polynomial(model) => [&model.poles[..], &model.noise_poles].concat(),

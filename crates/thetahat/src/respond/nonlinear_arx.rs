@@ -44,7 +44,7 @@ const PART: usize = 1024;
 
 /// The next output, less its offset, where one regressor moves through its range and the others stay in the middle of
 /// theirs; with where it is in its range, from 0 to 1.
-#[cfg(feature = "html")]
+#[cfg(feature = "present")]
 pub(crate) fn slice(
     model: &NonlinearArxModel,
     output: usize,

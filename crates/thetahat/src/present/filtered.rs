@@ -1,0 +1,62 @@
+//! What `filter` says at its end.
+
+use crate::filter::{EstimatedNumber, FilterSummary};
+use crate::present::Layout;
+use crate::respond::NisSummary;
+
+use crate::figures::{fixed, number};
+
+use super::tree::{Medium, Sections, columns, error, figure, word};
+
+/// How consistent the innovations were (NIS), and where the state has come to.
+pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String {
+    let on = &mut Sections::new(Medium::Text);
+    let estimator = match summary.estimator.as_str() {
+        "kalman" => "Kalman filter",
+        "ekf" => "extended Kalman filter",
+        _ => "Luenberger observer",
+    };
+    on.line(format!("{estimator}: {} rows{faults}, {} values measured", summary.rows, summary.measured));
+    if let Some(sum) = summary.log_likelihood {
+        on.line(format!("log-likelihood {}", number(sum)));
+    }
+    if let Some(nis) = &summary.nis {
+        on.line(&surprise(nis));
+    }
+    on.gap();
+    for (title, estimates) in [("state", &summary.states), ("parameter", &summary.parameters)] {
+        if !estimates.is_empty() {
+            table(on, title, estimates);
+        }
+    }
+    super::text::written(on, layout)
+}
+
+fn table(on: &mut Sections, title: &str, estimates: &[EstimatedNumber]) {
+    let bounded = estimates.iter().any(|estimate| estimate.change_of_variable.is_some());
+    let mut table = columns("Estimates", [title, "value", "standard deviation", "estimated as"])
+        .words(&[3])
+        .none("an observer knows no standard deviations")
+        .without(if bounded { &[] } else { &[3] });
+    for estimate in estimates {
+        table.row([
+            word(&estimate.name),
+            figure(estimate.value, number),
+            error(estimate.standard_deviation),
+            word(estimate.change_of_variable.clone().unwrap_or_default()),
+        ]);
+    }
+    on.table(table);
+}
+
+/// How the normalised innovations squared lie.
+pub(super) fn surprise(nis: &NisSummary) -> String {
+    format!(
+        "normalised innovation squared: mean {}, {} if the model is right; below its 95 % bounds {} %, above {} %, 2.5 % each if \
+         it is right",
+        fixed(nis.mean, 3),
+        fixed(nis.expected, 3),
+        fixed(100.0 * nis.below, 1),
+        fixed(100.0 * nis.above, 1)
+    )
+}

@@ -13,7 +13,7 @@ fn repeated(folder: &Folder, options: &str) -> (Value, Value) {
     folder.done("fit log.csv --plan first.json --report again.json");
     folder.done("fit log.csv --plan plan.json --report plain.json");
     assert_eq!(folder.read("again.json"), folder.read("plain.json"), "{options}");
-    (first, serde_json::from_str(&folder.read("again.json")).unwrap())
+    (first, serde_json::from_str(&folder.read("again.json")).expect("a report"))
 }
 
 #[test]

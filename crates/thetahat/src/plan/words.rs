@@ -90,7 +90,7 @@ pub enum CoupleWord {
     Full,
     /// Its own.
     None,
-    /// The data say it.
+    /// Decided from the data.
     Auto,
 }
 
@@ -167,7 +167,7 @@ words! { of Constant {
 /// Whether inputs act at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FeedthroughWord {
-    /// The data say it.
+    /// Decided from the data.
     #[default]
     Auto,
     /// They do.
@@ -177,7 +177,7 @@ pub enum FeedthroughWord {
 }
 
 words! { of FeedthroughWord {
-    Auto "auto" "The data say it",
+    Auto "auto" "Decided from the data",
     Yes "yes" "They do: D is estimated",
     No "no" "They do not: D is zero",
 }}
@@ -205,7 +205,7 @@ pub enum MapWord {
     Step,
     /// Radial basis functions that are trained.
     RbfFree,
-    /// The data say it.
+    /// Decided from the data.
     Auto,
     /// A linear model.
     None,

@@ -21,7 +21,7 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
         on.line(format!("log-likelihood {}", number(sum)));
     }
     if let Some(nis) = &summary.nis {
-        on.line(&surprise(nis));
+        on.line(surprise(nis));
     }
     on.gap();
     for (title, estimates) in [("state", &summary.states), ("parameter", &summary.parameters)] {

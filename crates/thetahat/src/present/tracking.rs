@@ -27,8 +27,8 @@ pub fn tracking(summary: &TrackSummary, faults: &str, watched: bool, layout: Lay
                     formula(&tracker.orders)
                 ));
             }
-            None => on.line(&formula(&tracker.orders)),
-            Some(map) => on.line(&map.name(map.parameters(tracker.orders.parameters()))),
+            None => on.line(formula(&tracker.orders)),
+            Some(map) => on.line(map.name(map.parameters(tracker.orders.parameters()))),
         }
         on.line(format!("{} rows{faults}{gaps}", summary.rows));
         // The outputs are the last ones, each of its tracker.

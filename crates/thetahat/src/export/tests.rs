@@ -11,16 +11,7 @@ use super::program::Program;
 use super::vector::Vector;
 use super::*;
 use crate::data::{Channel, Log};
-
-/// Numbers that look random, in -1 … 1.
-pub(super) fn signal(seed: u32, rows: usize) -> Vec<f64> {
-    let mut random = seed;
-    let mut next = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 8) / f64::from(1 << 23) - 1.0
-    };
-    (0..rows).map(|_| next()).collect()
-}
+pub(super) use crate::tests::congruential as signal;
 
 pub(super) fn log(channels: &[(&str, Vec<f64>)], sample_time: f64) -> Log {
     let channel =

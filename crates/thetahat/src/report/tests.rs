@@ -59,7 +59,7 @@ fn is_consistent(report: &Report, log: &Log) {
 
 /// y(t) = 0.9 y(t-1) + u(t-1) with white noise around it, u held for some samples.
 fn first_order(samples: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
-    let u: Vec<f64> = (0..samples).map(|_| noise.normal()).collect();
+    let u: Vec<f64> = noise.take_normal(samples);
     let mut x = vec![3.0];
     (1..samples).for_each(|t| x.push(0.95 * x[t - 1] + u[t - 1]));
     let y = x.iter().map(|x| x + noise.normal()).collect();

@@ -13,8 +13,7 @@ mod refusals;
 
 /// White noise of variance 1.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
-    let mut noise = Noise(seed << 32);
-    (0..count).map(|_| noise.normal()).collect()
+    Noise(seed << 32).take_normal(count)
 }
 
 /// A log with a sample time of half a second.

@@ -46,8 +46,8 @@ fn predictions_are_those_of_the_difference_equation() {
         model.output.name = "y".to_owned();
         model.output.offset = Offset { level: -2.0, slope: 0.02 };
         let mut noise = Noise(17);
-        let u: Vec<Vec<f64>> = (0..inputs).map(|_| (0..80).map(|_| noise.normal()).collect()).collect();
-        let y: Vec<f64> = (0..80).map(|_| noise.normal()).collect();
+        let u: Vec<Vec<f64>> = (0..inputs).map(|_| noise.take_normal(80)).collect();
+        let y: Vec<f64> = noise.take_normal(80);
         let record = Record::new(&y, u.iter().map(Vec::as_slice).collect()).unwrap();
         let expected = predict(&model, &record, 1, InitialCondition::Zero).unwrap().values;
 

@@ -11,15 +11,11 @@ use crate::model::{OffsetCovariance, Orders};
 use crate::report::identify;
 use crate::respond::Horizon;
 use crate::select::Choice;
+use crate::tests::congruential;
 
 /// Numbers in -1 … 1.
 fn noise(count: usize, seed: u32) -> Vec<f64> {
-    let mut random = seed;
-    let mut next = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 8) / f64::from(1 << 23) - 1.0
-    };
-    (0..count).map(|_| next()).collect()
+    congruential(seed, count)
 }
 
 /// Two inputs, and an output that is far from zero.

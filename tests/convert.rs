@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use crate::harness::{Folder, number};
+use crate::signals::Random;
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
 
@@ -168,10 +169,9 @@ fn what_has_no_counterpart_is_refused() {
         folder.refused("convert n.json --to 1 -o x.json", 3).contains("are converted to other sample times")
     );
     // y(t) = -0.5 y(t-1) + u(t-1).
-    let (mut text, mut y, mut random) = ("u,y\n".to_owned(), 0.0, 1_u32);
+    let (mut text, mut y, mut random) = ("u,y\n".to_owned(), 0.0, Random::new(1));
     for _ in 0..300 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let u = f64::from(random >> 16) / 32_768.0 - 1.0;
+        let u = random.uniform();
         text.push_str(&format!("{u},{y}\n"));
         y = -0.5 * y + u;
     }

@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use crate::c_library::{Precision, done, library};
 use crate::harness::Folder;
+use crate::signals::Random;
 
 /// What C has to be compiled with.
 const STRICT: [&str; 7] = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror", "-O2"];
@@ -151,11 +152,10 @@ fn models_of_other_kinds_say_what_the_library_does() {
 #[test]
 fn nonlinear_models_say_what_the_library_does() {
     // y(t) = 0.6 y(t-1) + 0.3 u(t-1)^2 - 0.1 y(t-1) u(t-1), and a little of what looks like noise.
-    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, 1_u32);
+    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, Random::new(1));
     for t in 0..400 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.01 * f64::from(random >> 16 & 0xff) / 256.0;
-        u = f64::from(random >> 8) / f64::from(1 << 23) - 1.0;
+        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.005 * random.uniform();
+        u = random.uniform();
         text += &format!("{t},{u},{y}\n");
     }
     let folder = Folder::with_log(text);
@@ -218,12 +218,9 @@ fn models_in_equations_say_what_the_library_does() {
 }
 
 /// Equations of so many states and inputs, random but stable, with a log along which they run.
-fn random_equations(seed: u32) -> (String, String) {
-    let mut random = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
-    let mut below = |count: usize| {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (random >> 8) as usize % count
-    };
+fn random_equations(seed: u64) -> (String, String) {
+    let mut random = Random::new(seed);
+    let mut below = |count: usize| random.below(count);
     let (states, inputs, outputs, substeps) = (1 + below(6), below(4), 1 + below(2), 1 + below(3));
     let kind = ["derivative", "next"][below(2)];
     let line = |text: &mut String, line: String| *text += &(line + "\n");
@@ -596,11 +593,10 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
 #[test]
 fn controllers_control() {
     // y(t) - 20 = 0.9 (y(t-1) - 20) + 0.2 (u(t-1) - 50), without noise but for a little.
-    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, 1_u32);
+    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, Random::new(1));
     for _ in 0..400 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 0.001 * f64::from(random >> 16 & 0xff) / 256.0;
-        u = 50.0 + f64::from(random >> 28) - 7.5;
+        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 5e-4 * random.uniform();
+        u = 50.0 + 7.5 * random.uniform();
         text += &format!("{u},{y}\n");
     }
     let folder = Folder::with_log(text);

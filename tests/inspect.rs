@@ -421,7 +421,7 @@ fn one_step_is_no_sample_of_feedback_and_delays() {
 fn findings_name_their_channels_and_rows() {
     // Values that are missing, a sensor at its limit, a time that jumps and an outlier.
     let mut random = crate::signals::Random::new(12);
-    let u: Vec<f64> = (0..400).map(|_| random.uniform()).collect();
+    let u: Vec<f64> = random.signal(400);
     let mut y: Vec<f64> =
         (0..400).map(|row| 3.0 * (0.05 * row as f64).sin() + 0.01 * random.uniform()).collect();
     y.iter_mut().for_each(|value| *value = value.min(2.5));

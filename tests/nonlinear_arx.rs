@@ -3,20 +3,16 @@
 use serde_json::Value;
 
 use crate::harness::{Folder, number};
-use crate::signals::csv;
+use crate::signals::{Random, csv};
 
 /// A plant whose gain grows with its input.
 fn plant(rows: usize) -> String {
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-    };
-    let u: Vec<f64> = (0..rows).map(|_| random()).collect();
+    let mut random = Random::new(1);
+    let u: Vec<f64> = random.signal(rows);
     let mut y = vec![3.0];
     for k in 1..rows {
         let x = u[k - 1];
-        y.push(3.0 + 0.5 * (y[k - 1] - 3.0) + x + 0.4 * x * x + 0.05 * random());
+        y.push(3.0 + 0.5 * (y[k - 1] - 3.0) + x + 0.4 * x * x + 0.05 * random.uniform());
     }
     csv(&[("u", &u), ("y", &y)])
 }
@@ -337,12 +333,10 @@ fn products_are_taken_by_name() {
 #[test]
 fn several_outputs_and_expressions_take_every_verb() {
     let text = plant(900);
-    let mut state = 5_u32;
+    let mut random = Random::new(5);
     let (mut level, mut before) = (4.0_f64, 0.0);
     let lines = text.lines().skip(1).map(|line| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        level +=
-            0.3 * (2.0 + before - level.sqrt()) + 1e-3 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
+        level += 0.3 * (2.0 + before - level.sqrt()) + 1e-3 * random.uniform();
         before = line.split(',').next().and_then(|cell| cell.parse().ok()).expect("it is a number");
         format!("{line},{level}\n")
     });
@@ -495,15 +489,11 @@ fn trackers_take_functions() {
 /// every verb takes them.
 #[test]
 fn splines_find_what_bends() {
-    let mut state = 7_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-    };
-    let u: Vec<f64> = (0..1500).map(|_| random()).collect();
+    let mut random = Random::new(7);
+    let u: Vec<f64> = random.signal(1500);
     let mut y = vec![0.0];
     for k in 1..1500 {
-        y.push(0.4 * y[k - 1] + (3.0 * u[k - 1]).tanh() + 0.02 * random());
+        y.push(0.4 * y[k - 1] + (3.0 * u[k - 1]).tanh() + 0.02 * random.uniform());
     }
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     let common = "--ny 1 --nu 1 --sample-time 1 --estimate 1..1000 --validate 1001..1500";

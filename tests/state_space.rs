@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::fit_reference::{folder_with, folder_with_any};
 use crate::harness::{Folder, number};
+use crate::signals::Random;
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
 
@@ -253,13 +254,9 @@ fn logs_that_say_too_little_are_refused() {
     folder.write("short.csv", short);
     let refusal = folder.run("fit short.csv -u u -y y1,y2 --sample-time 1 --past 5 --report r.json");
     assert!(refusal.code == 4 && refusal.stderr.contains("more samples than signals"), "{refusal:?}");
-    let (mut dependent, mut random, mut x) = ("u,y1,y2,y3\n".to_owned(), 1_u32, 0.0);
-    let mut draw = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 16) / 32_768.0 - 1.0
-    };
+    let (mut dependent, mut random, mut x) = ("u,y1,y2,y3\n".to_owned(), Random::new(1), 0.0);
     for _ in 0..300 {
-        let (u, y) = (draw(), x + 0.1 * draw());
+        let (u, y) = (random.uniform(), x + 0.1 * random.uniform());
         x = 0.8 * x + u;
         writeln!(dependent, "{u},{y},{},4", 2.0 * y + 1.0).expect("memory");
     }

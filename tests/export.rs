@@ -470,7 +470,7 @@ fn nearest_neighbours_are_for_rust_alone() {
         "export r.json dc_motor.csv --time t --rows 200..300 --what predictor --precision f64 --name model";
     folder.done(&format!("{export} --to rust"));
     rustc(&folder, "model");
-    assert!(folder.refused(&format!("{export} --to c"), 2).contains("nearest neighbours"));
+    folder.assert_refused(&format!("{export} --to c"), 2, "nearest neighbours");
 }
 
 /// Takes 17 s: four estimators in Rust and C, each built with the library that it steps.
@@ -489,8 +489,11 @@ fn estimators_go_on_from_the_fit() {
     }
     folder.done("fit dc_motor.csv --time t --model oe --nb 2 --nf 2 --report r.json");
     for language in ["rust", "c"] {
-        let message = folder.refused(&format!("export r.json --to {language} --what recursive"), 3);
-        assert!(message.contains("can be tracked"), "{message}");
+        folder.assert_refused(
+            &format!("export r.json --to {language} --what recursive"),
+            3,
+            "can be tracked",
+        );
     }
 }
 
@@ -584,8 +587,11 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
         assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
     }
     folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
-    let message = folder.refused("export line.json --to rust --what simulator", 3);
-    assert!(message.contains("is a line in the time of its log"), "{message}");
+    folder.assert_refused(
+        "export line.json --to rust --what simulator",
+        3,
+        "is a line in the time of its log",
+    );
     let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
     assert_eq!(after, before);
 }
@@ -630,13 +636,15 @@ fn controllers_control() {
     // With a log there is a test vector.
     goes_round(&folder, "c.json", "log.csv --sample-time 1", &["controller"]);
     assert!(folder.read("model.csv").starts_with("u1,y1,set_point1,expected1\n"));
-    let message = folder.refused("export c.json log.csv --sample-time 2 --to c --what controller", 3);
-    assert!(message.contains("the controller's 1 s"), "{message}");
+    folder.assert_refused(
+        "export c.json log.csv --sample-time 2 --to c --what controller",
+        3,
+        "the controller's 1 s",
+    );
     for (line, words) in [
         ("c.json --to c --what predictor", "a controller is exported as no predictor; take controller"),
         ("r.json --to c --what controller", "a model is no controller"),
     ] {
-        let message = folder.refused(&format!("export {line}"), 2);
-        assert!(message.contains(words), "{message}");
+        folder.assert_refused(&format!("export {line}"), 2, words);
     }
 }

@@ -234,8 +234,7 @@ fn all_columns_of_numbers_are_looked_at() {
     let line = folder.refused("inspect log.csv -u note", 3);
     assert!(line.contains("log.csv:2:") && line.contains("column 'note'"), "{line}");
     // Words among numbers are a fault and not another kind of column.
-    let line = Folder::with_log("u,y\n1,2\n3,broken\n").refused("inspect log.csv", 3);
-    assert!(line.contains("log.csv:3:3"), "{line}");
+    Folder::with_log("u,y\n1,2\n3,broken\n").assert_refused("inspect log.csv", 3, "log.csv:3:3");
 }
 
 #[test]
@@ -329,8 +328,7 @@ fn small_and_odd_logs() {
         ("u,y\n1,2\n", "--html log.csv", 2, "replaced"),
     ] {
         let folder = Folder::with_log(log);
-        let line = folder.refused(&format!("inspect log.csv {options}"), code);
-        assert!(line.contains(word), "{word}: {line}");
+        folder.assert_refused(&format!("inspect log.csv {options}"), code, word);
         assert_eq!(folder.read("log.csv"), log);
     }
     Folder::new().refused("inspect nowhere.csv", 5);

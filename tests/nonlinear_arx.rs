@@ -61,8 +61,11 @@ fn every_verb_takes_a_network() {
         assert!(run.stderr.lines().count() < 4, "{options}: {}", run.stderr);
     }
     for wrong in ["-1", "nan", "0.1,0.2"] {
-        let said = folder.refused(&format!("filter model.json log.csv --measurement-noise {wrong}"), 2);
-        assert!(said.contains("--measurement-noise"), "{said}");
+        folder.assert_refused(
+            &format!("filter model.json log.csv --measurement-noise {wrong}"),
+            2,
+            "--measurement-noise",
+        );
     }
 }
 
@@ -242,8 +245,7 @@ fn bad_logs_are_told() {
     ] {
         for map in maps {
             let line = format!("fit {log}.csv --narx {map} --ny 1 --nu 1 --sample-time 1 {options}");
-            let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
-            assert!(said.contains(words), "{line}: {said}");
+            folder.assert_refused(&format!("{line} --report report.json --html page.html"), code, words);
         }
     }
     for (log, options, code, words) in [
@@ -262,8 +264,7 @@ fn bad_logs_are_told() {
         ("good", "--narx knn --units 35", 4, "39 samples are too few"),
     ] {
         let line = format!("fit {log}.csv --ny 1 --nu 1 --sample-time 1 {options}");
-        let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
-        assert!(said.contains(words), "{line}: {said}");
+        folder.assert_refused(&format!("{line} --report report.json --html page.html"), code, words);
     }
     assert!(folder.names().iter().all(|name| name.ends_with(".csv")), "{:?}", folder.names());
 }

@@ -132,8 +132,7 @@ fn a_frequency_response_makes_a_process() {
     let outside = |model: usize| number(&found, &format!("/models/{model}/response/0/outside"));
     assert!(outside(0) < 30.0 && outside(1) > 100.0, "{table}");
     folder.done("validate model.json log.csv --sample-time 1");
-    let error = folder.refused("fit --from response.json --structure p1d -u v", 2);
-    assert!(error.contains("none called 'v'"), "{error}");
+    folder.assert_refused("fit --from response.json --structure p1d -u v", 2, "none called 'v'");
     folder.refused("fit --from log.csv --structure p1d", 3);
     folder.refused("fit --from nowhere.json --structure p1d", 5);
     for line in ["fit --from response.json", "fit --from response.json log.csv --structure p1d", "fit"] {
@@ -184,8 +183,7 @@ fn what_cannot_be_is_told() {
         ("--structure p1d --estimate 1..900", 3, "900"),
     ] {
         let before = folder.names();
-        let error = folder.refused(&format!("fit {TCLAB} {options} --report model.json"), code);
-        assert!(error.contains(words), "{options}: {error}");
+        folder.assert_refused(&format!("fit {TCLAB} {options} --report model.json"), code, words);
         assert_eq!(folder.names(), before);
     }
     // What is of other models.
@@ -280,7 +278,7 @@ fn transfer_functions_are_found_in_every_verb() {
         value(&report, "b0").0 / value(&report, "a0").0,
         1e-9,
     );
-    assert!(folder.refused("tune model.json", 2).contains("tf20d"));
+    folder.assert_refused("tune model.json", 2, "tf20d");
 
     // What is no resonance comes to the same as lags.
     let lags = folder.fit(&format!("{TCLAB} --structure p2"));
@@ -333,8 +331,7 @@ fn transfer_functions_are_found_in_every_verb() {
         ("--structure tf2", "no structure of a process"),
         ("--model ss --np 2", "--np"),
     ] {
-        let refusal = folder.refused(&format!("fit {TCLAB} {options}"), 2);
-        assert!(refusal.contains(words), "{options}: {refusal}");
+        folder.assert_refused(&format!("fit {TCLAB} {options}"), 2, words);
     }
     for options in ["--nz 1", "--delay", "--np 2 --structure p1d", "--np 2 --na 1"] {
         assert_eq!(folder.run(&format!("fit {TCLAB} {options}")).code, 2, "{options}");

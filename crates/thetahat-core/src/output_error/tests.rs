@@ -5,18 +5,13 @@ use std::vec::Vec;
 
 use nalgebra::{Const, SVector, Vector2};
 
-use crate::arx::tests::Plant;
+use crate::arx::tests::{Plant, one};
 use crate::noise::Noise;
 use crate::{
-    Action, ArxOrders, Error, Forgetting, InputOrders, OutputErrorMethod, Real, RecursiveArx,
-    RecursiveOutputError,
+    Action, ArxOrders, Error, Forgetting, OutputErrorMethod, Real, RecursiveArx, RecursiveOutputError,
 };
 
 const METHODS: [OutputErrorMethod; 2] = [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments];
-
-const fn one(nb: usize, nk: usize) -> InputOrders {
-    InputOrders { nb, nk }
-}
 
 const FIRST: ArxOrders<'_> = ArxOrders { na: 1, inputs: &[one(1, 1)], constant: false };
 

@@ -175,9 +175,10 @@ mod tests {
     use thetahat_numerics::noise::Noise;
 
     use super::*;
-    use crate::data::{Channel, Log};
+    use crate::data::Log;
     use crate::model::{Interval, Model, Orders};
     use crate::report::{Plan, identify};
+    use crate::tests::channel;
 
     /// y(t) = 0.9 y(t-1) + b u(t-1) + e(t).
     fn report(b: f64, inputs: &[&str]) -> Report {
@@ -187,7 +188,6 @@ mod tests {
             y.push(0.9 * y[t] + b * u[t] + 0.1 * noise.uniform());
         }
         y.pop();
-        let channel = |name: &str, values| Channel { name: name.into(), values };
         let log = Log::new(vec![channel("u", u), channel("y", y)], 0.5).unwrap();
         let one = vec![1; inputs.len()];
         identify(log, &[], &Plan::new(inputs, "y", Orders::arx(1, &one, &one).unwrap())).unwrap()

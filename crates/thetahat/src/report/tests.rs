@@ -3,10 +3,11 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::{Channel, Log, Rows};
+use crate::data::{Log, Rows};
 use crate::estimate::{Initial, Procedure};
 use crate::model::{Model, Orders};
 use crate::respond::{Horizon, InitialCondition};
+use crate::tests::channel;
 use crate::validate::Part;
 
 impl Report {
@@ -22,7 +23,6 @@ impl Report {
 }
 
 fn log(u: &[f64], y: &[f64]) -> Log {
-    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
     Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
 }
 

@@ -1,10 +1,7 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-
-fn matrix(rows: &[&[f64]]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
-}
+use crate::tests::matrix;
 
 fn close(found: &DMatrix<f64>, expected: &DMatrix<f64>, tolerance: f64) -> bool {
     (found - expected).norm() <= tolerance * expected.norm().max(1.0)

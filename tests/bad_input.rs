@@ -350,8 +350,7 @@ fn orders_that_do_not_go_together() {
         ("--na 2 --nb 2 --nk 2000", "1000"),
         ("--na 2 --nb 0 -u u", "--input"),
     ] {
-        let line = folder.refused(&format!("fit log.csv {orders}"), 2);
-        assert!(line.contains(part), "{part}: {line}");
+        folder.assert_refused(&format!("fit log.csv {orders}"), 2, part);
     }
 }
 

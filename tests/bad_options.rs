@@ -62,8 +62,7 @@ fn orders_for_another_number_of_inputs() {
         ("--model oe -u a --nb 1001 --nf 2", &["1000"]),
     ]);
     let folder = Folder::with_log(plain_log());
-    let line = folder.refused("fit log.csv --model oe --nb 2 --nf 2,2", 2);
-    assert!(line.contains("--nf: 2 values for 1 input"), "{line}");
+    folder.assert_refused("fit log.csv --model oe --nb 2 --nf 2,2", 2, "--nf: 2 values for 1 input");
 }
 
 #[test]

@@ -69,8 +69,7 @@ fn a_parameter_twice_or_one_too_few_is_refused_by_every_verb() {
             "control changed.json --poles 0.5,0.5",
             "export changed.json --to c --what predictor",
         ] {
-            let line = folder.refused(words, 3);
-            assert!(line.contains("model.parameters are not those of the orders"), "{words}: {line}");
+            folder.assert_refused(words, 3, "model.parameters are not those of the orders");
         }
     }
 }

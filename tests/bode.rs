@@ -162,8 +162,8 @@ fn frequencies_that_make_no_sense() {
 #[test]
 fn a_report_that_is_none() {
     let folder = Folder::with_log(plain_log());
-    assert!(folder.refused("bode nowhere.json", 5).contains("nowhere.json: "));
-    assert!(folder.refused("bode log.csv", 3).contains("log.csv: this is not a thetahat report"));
+    folder.assert_refused("bode nowhere.json", 5, "nowhere.json: ");
+    folder.assert_refused("bode log.csv", 3, "log.csv: this is not a thetahat report");
 }
 
 /// The command line makes sense, the report does not.
@@ -175,8 +175,7 @@ fn numbers_near_the_end_of_the_range_are_those_of_the_report() {
         include_str!("../fuzz/seeds/document/kalman_gain_near_the_end.json"),
     ] {
         folder.write("model.json", seed);
-        let line = folder.refused("bode model.json", 3);
-        assert!(line.contains("model.json: "), "{line}");
+        folder.assert_refused("bode model.json", 3, "model.json: ");
     }
     // Whoever names a frequency has named it.
     folder.refused("bode model.json --frequencies 1..2", 2);

@@ -212,7 +212,7 @@ fn a_series_without_inputs_is_left_to_the_data_too() {
     }
     assert_eq!(folder.fit("log.csv --model ar --na 1..4")["model"]["orders"]["na"], 2);
     // Without a word about inputs they are asked for.
-    assert!(folder.refused("fit log.csv", 3).contains("--nb 0"));
+    folder.assert_refused("fit log.csv", 3, "--nb 0");
 }
 
 fn orders_of_series(report: &Value) -> (u64, u64) {

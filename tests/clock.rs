@@ -138,10 +138,10 @@ fn the_one_column_that_is_a_clock_is_taken() {
         "log.csv",
         written(|time| format!("{time},{}", time + 5.0)).replacen("time", "time,timestamp", 1),
     );
-    let refusal = folder.refused("fit log.csv --na 2 --nb 2", 3);
-    assert!(
-        refusal.contains("several columns may be the clock: 'time', 'timestamp'; name one with --time"),
-        "{refusal}"
+    folder.assert_refused(
+        "fit log.csv --na 2 --nb 2",
+        3,
+        "several columns may be the clock: 'time', 'timestamp'; name one with --time",
     );
     folder.done("fit log.csv --na 2 --nb 2 --time timestamp");
     folder.done("fit log.csv --na 2 --nb 2 --sample-time 1");
@@ -228,8 +228,11 @@ fn irregular() -> (String, [[Vec<f64>; 2]; 2]) {
 fn a_step_that_leaves_one_row_is_refused_however_long_it_is() {
     let folder = Folder::with_log("t,u,y\n0,0,0\n1,1,1\n2,0,1\n3,1,2\n4,0,1\n5,1,1\n");
     for step in ["6", "1e7", "1e300"] {
-        let line = folder.refused(&format!("fit log.csv --time t --na 1 --nb 1 --resample {step}:linear"), 2);
-        assert!(line.contains("leaves one row of a log of 5 s"), "{line}");
+        folder.assert_refused(
+            &format!("fit log.csv --time t --na 1 --nb 1 --resample {step}:linear"),
+            2,
+            "leaves one row of a log of 5 s",
+        );
     }
 }
 
@@ -273,8 +276,7 @@ fn fit_and_inspect_advise_the_same() {
     times.truncate(620);
     folder.write("log.csv", Experiment::new(620).timed(&times));
     let advice = "resample it every 1 s (--resample 1:linear)";
-    let refusal = folder.refused("fit log.csv --time time --na 2 --nb 2", 3);
-    assert!(refusal.contains(advice), "{refusal}");
+    folder.assert_refused("fit log.csv --time time --na 2 --nb 2", 3, advice);
     let document = folder.done("inspect log.csv --time time --format json").stdout;
     // The document names the argument, the program its option.
     let named = advice.replace("--resample", "`resample`");

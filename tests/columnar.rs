@@ -124,27 +124,24 @@ fn a_run_that_was_ended_goes_on() {
 #[test]
 fn what_they_do_not_hold_is_refused() {
     let folder = folder();
-    let refused = |line: &str, expected: &str| {
-        let refusal = folder.refused(line, 3);
-        assert!(refusal.contains(expected), "{refusal}");
-    };
-    refused("fit pyarrow.parquet -u note --na 1 --nb 1", "pyarrow.parquet: column 'note' holds texts");
-    refused("fit pyarrow.parquet -u pair --na 1 --nb 1", "column 'pair' is of the type Struct");
-    refused("fit pyarrow.parquet -u when --na 1 --nb 1", "column 'when' holds times");
-    refused(
-        "fit pyarrow.arrow --delimiter ; --na 1 --nb 1",
-        "--delimiter says how a text is written, and this is an Arrow file",
-    );
-    refused(
-        "fit polars.arrow --time when --time-format %Y --na 1 --nb 1",
-        "--time-format says nothing of it",
-    );
     folder.write("short.parquet", &fs::read(data("polars.parquet")).unwrap()[..3000]);
-    refused("fit short.parquet --na 1 --nb 1", "short.parquet: this is no whole Parquet file");
     folder.write("short.arrow", &fs::read(data("polars.arrow")).unwrap()[..1500]);
-    refused("fit short.arrow --na 1 --nb 1", "short.arrow: this is no whole Arrow file");
     folder.write("short.arrows", &fs::read(data("polars.arrows")).unwrap()[..1500]);
-    refused("fit short.arrows --na 1 --nb 1", "short.arrows: it ends too early");
+    for (line, words) in [
+        ("fit pyarrow.parquet -u note --na 1 --nb 1", "pyarrow.parquet: column 'note' holds texts"),
+        ("fit pyarrow.parquet -u pair --na 1 --nb 1", "column 'pair' is of the type Struct"),
+        ("fit pyarrow.parquet -u when --na 1 --nb 1", "column 'when' holds times"),
+        (
+            "fit pyarrow.arrow --delimiter ; --na 1 --nb 1",
+            "--delimiter says how a text is written, and this is an Arrow file",
+        ),
+        ("fit polars.arrow --time when --time-format %Y --na 1 --nb 1", "--time-format says nothing of it"),
+        ("fit short.parquet --na 1 --nb 1", "short.parquet: this is no whole Parquet file"),
+        ("fit short.arrow --na 1 --nb 1", "short.arrow: this is no whole Arrow file"),
+        ("fit short.arrows --na 1 --nb 1", "short.arrows: it ends too early"),
+    ] {
+        folder.assert_refused(line, 3, words);
+    }
 }
 
 #[test]

@@ -91,15 +91,16 @@ fn a_slope_is_found_and_told() {
 #[test]
 fn what_does_not_go_together_is_refused() {
     let folder = steps(0.0);
-    let line = folder.refused(&format!("fit {OE} --trend --constant no"), 2);
-    assert!(line.contains("--trend: it is a line with a level"), "{line}");
+    folder.assert_refused(
+        &format!("fit {OE} --trend --constant no"),
+        2,
+        "--trend: it is a line with a level",
+    );
     let arx = "fit log.csv --sample-time 2 --na 1 --nb 1 --constant yes";
-    let line = folder.refused(&format!("{arx} --initial zero"), 2);
-    assert!(line.contains("--constant: zeros before the first sample"), "{line}");
+    folder.assert_refused(&format!("{arx} --initial zero"), 2, "--constant: zeros before the first sample");
     let line = folder.refused(&format!("{arx} --ridge 1"), 2);
     assert!(line.contains("--constant") && line.contains("ridge"), "{line}");
-    let line = folder.refused(&format!("fit log.csv log.csv {} --trend", &OE[8..]), 2);
-    assert!(line.contains("--trend: several logs"), "{line}");
+    folder.assert_refused(&format!("fit log.csv log.csv {} --trend", &OE[8..]), 2, "--trend: several logs");
 }
 
 #[test]

@@ -103,8 +103,7 @@ fn what_cannot_be_designed_is_told_and_nothing_is_written() {
         ("control log.csv --lqr 1", 3, "not a thetahat report"),
         ("control nowhere.json --lqr 1", 5, "cannot be read"),
     ] {
-        let error = folder.refused(&format!("{line} --responses r.csv --document c.json"), code);
-        assert!(error.contains(words), "{line}: {error}");
+        folder.assert_refused(&format!("{line} --responses r.csv --document c.json"), code, words);
         assert_eq!(folder.names(), before);
     }
 }

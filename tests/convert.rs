@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use crate::harness::{Folder, number};
+use crate::signals::Random;
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
 
@@ -93,8 +94,11 @@ fn a_model_in_continuous_time_goes_with_any_log() {
     };
     assert!(apart(at("c.json", "log.csv"), at("r.json", "log.csv")) < 1e-6);
     assert!(apart(at("c.json", "slow.csv"), at("s.json", "slow.csv")) < 1e-6);
-    let refusal = folder.refused("validate r.json slow.csv --time t", 3);
-    assert!(refusal.contains("resample the log, convert the model, or fit one to it"), "{refusal}");
+    folder.assert_refused(
+        "validate r.json slow.csv --time t",
+        3,
+        "resample the log, convert the model, or fit one to it",
+    );
     // Other verbs.
     for line in [
         "predict c.json slow.csv --time t --horizon 5 --out p.csv",
@@ -117,7 +121,7 @@ fn a_model_in_continuous_time_goes_with_any_log() {
     let (one, other) = (numbers(&one), numbers(&folder.read("own.csv")));
     let farthest = one.iter().zip(&other).map(|(one, other)| (one - other).abs()).fold(0.0, f64::max);
     assert!(one.len() == other.len() && farthest < 1e-9, "{farthest}");
-    assert!(folder.refused("reduce c.json", 3).contains("convert it to a sample time first"));
+    folder.assert_refused("reduce c.json", 3, "convert it to a sample time first");
 }
 
 #[test]
@@ -128,8 +132,11 @@ fn polynomials_and_processes_are_converted_too() {
     assert!(table.contains("delay 0.02 s") && table.contains("e^(-0.02 s)"), "{table}");
     // A third of a delay of two samples is a part of one.
     assert!(folder.done("convert p.json --to 0.03 -o s.json").stdout.contains("order 3"));
-    let refusal = folder.refused("convert p.json --to 0.03 --hold foh -o x.json", 2);
-    assert!(refusal.contains("--to: the delay of 'u', 0.02 s, is 0.666667 samples"), "{refusal}");
+    folder.assert_refused(
+        "convert p.json --to 0.03 --hold foh -o x.json",
+        2,
+        "--to: the delay of 'u', 0.02 s, is 0.666667 samples",
+    );
     let mut steps = "t,u,y\n".to_owned();
     for row in 0..400 {
         let time = 0.5 * f64::from(row);
@@ -157,29 +164,28 @@ fn what_has_no_counterpart_is_refused() {
         ("convert r.json --to 1 --hold ramp", "--hold: 'ramp' is none of zoh, foh and tustin"),
         ("convert r.json --to 0.02 -o r.json", "r.json"),
     ] {
-        let refusal = folder.refused(line, 2);
-        assert!(refusal.contains(words), "{line}: {refusal}");
+        folder.assert_refused(line, 2, words);
     }
     folder.done("convert r.json --to continuous -o c.json");
-    assert!(folder.refused("convert c.json --to continuous", 2).contains("in continuous time already"));
-    assert!(folder.refused("convert log.csv --to continuous", 3).contains("not a thetahat report"));
+    folder.assert_refused("convert c.json --to continuous", 2, "in continuous time already");
+    folder.assert_refused("convert log.csv --to continuous", 3, "not a thetahat report");
     folder.done("fit log.csv --time t -u u -y speed --narx poly --report n.json");
-    assert!(
-        folder.refused("convert n.json --to 1 -o x.json", 3).contains("are converted to other sample times")
-    );
+    folder.assert_refused("convert n.json --to 1 -o x.json", 3, "are converted to other sample times");
     // y(t) = -0.5 y(t-1) + u(t-1).
-    let (mut text, mut y, mut random) = ("u,y\n".to_owned(), 0.0, 1_u32);
+    let (mut text, mut y, mut random) = ("u,y\n".to_owned(), 0.0, Random::new(1));
     for _ in 0..300 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        let u = f64::from(random >> 16) / 32_768.0 - 1.0;
+        let u = random.uniform();
         text.push_str(&format!("{u},{y}\n"));
         y = -0.5 * y + u;
     }
     folder.write("odd.csv", text);
     folder.done("fit odd.csv --sample-time 1 --na 1 --nb 1 --nk 1 --report o.json");
-    let refusal = folder.refused("convert o.json --to continuous -o x.json", 4);
-    assert!(refusal.contains("the pole -0.5 on the negative real axis has no real logarithm"), "{refusal}");
-    assert!(folder.refused("convert o.json --to 1.5 -o x.json", 4).contains("o.json"));
+    folder.assert_refused(
+        "convert o.json --to continuous -o x.json",
+        4,
+        "the pole -0.5 on the negative real axis has no real logarithm",
+    );
+    folder.assert_refused("convert o.json --to 1.5 -o x.json", 4, "o.json");
     // Two steps are one, and its pole is 0.25.
     folder.done("convert o.json --to 2 -o t.json");
     assert!((number(&document(&folder.read("t.json")), "/model/f/0/0") - 0.25).abs() < 1e-6);

@@ -66,7 +66,7 @@ fn a_demo_that_cannot_write_says_so() {
     let folder = Folder::new();
     folder.write("file", "");
     for place in ["file", "file/below"] {
-        assert!(folder.refused(&format!("demo {place}"), 5).contains(place));
+        folder.assert_refused(&format!("demo {place}"), 5, place);
     }
 }
 

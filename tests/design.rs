@@ -174,14 +174,13 @@ fn what_makes_no_sense_is_one_sentence_and_nothing_is_written() {
         ("--for model.json --sample-time 1", "the model's is 0.5; leave it out"),
         ("--for model.json --signal prbs --band 0.1..1", "--band: none of these signals has one"),
     ] {
-        let line = folder.refused(&format!("design {options} -o out.csv"), 2);
-        assert!(line.contains(part), "{options}: {line}");
+        folder.assert_refused(&format!("design {options} -o out.csv"), 2, part);
     }
     for options in ["--want a1:1", "--for model.json --spectrum s.csv"] {
         assert_eq!(folder.run(&format!("design {options}")).code, 2, "{options}");
     }
-    assert!(folder.refused("design --for nowhere.json", 5).contains("nowhere.json: "));
-    assert!(folder.refused("design --for log.csv", 3).contains("log.csv: this is not a thetahat report"));
+    folder.assert_refused("design --for nowhere.json", 5, "nowhere.json: ");
+    folder.assert_refused("design --for log.csv", 3, "log.csv: this is not a thetahat report");
     assert!(!folder.names().contains(&"out.csv".to_owned()));
     let report = folder.read("model.json");
     folder.refused("design --for model.json -o model.json", 2);
@@ -196,5 +195,5 @@ fn models_of_other_kinds_and_without_inputs_are_refused() {
     assert!(line.contains("nonlinear.json: ") && line.contains("the plan of an experiment"), "{line}");
     folder.write("series.csv", csv(&[("y", &Experiment::new(200).y)]));
     folder.done("fit series.csv --model ar --na 2 --report series.json");
-    assert!(folder.refused("design --for series.json", 3).contains("series.json: the model has no inputs"));
+    folder.assert_refused("design --for series.json", 3, "series.json: the model has no inputs");
 }

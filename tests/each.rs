@@ -157,8 +157,7 @@ fn a_document_belongs_to_its_log_and_is_whole() {
     folder.done(&format!("{} t.csv", each("a/x.csv")));
     let (document, journal) = (folder.read("out/x.json"), folder.read("out/journal.jsonl"));
     let refused = |line: &str, why: &str| {
-        let message = folder.refused(line, 2);
-        assert!(message.contains(why), "{line}: {message}");
+        folder.assert_refused(line, 2, why);
         assert_eq!(
             (folder.read("out/x.json"), folder.read("out/journal.jsonl")),
             (document.clone(), journal.clone())
@@ -242,8 +241,11 @@ fn what_makes_no_sense_is_refused_before_anything_is_done() {
     // A log for each document.
     std::fs::copy(folder.path("logs/plant00.csv"), folder.path("logs/plant00.txt"))
         .expect("it can be copied");
-    let why = folder.refused("fit --each logs/plant00.csv logs/plant00.txt --table x.csv --reports out", 2);
-    assert!(why.contains("would both be plant00.json"), "{why}");
+    folder.assert_refused(
+        "fit --each logs/plant00.csv logs/plant00.txt --table x.csv --reports out",
+        2,
+        "would both be plant00.json",
+    );
     folder.done("fit --each logs/plant00.csv logs/plant00.txt --na 1 --nb 1 --table x.csv");
 }
 
@@ -262,8 +264,11 @@ fn a_full_disk_ends_the_run_without_a_table() {
     let folder = plants(2);
     std::fs::create_dir(folder.path("out")).expect("a folder can be made");
     std::os::unix::fs::symlink("/dev/full", folder.path("out/plant01.json")).expect("a link can be made");
-    let why = folder.refused("fit --each logs/plant*.csv --na 1 --nb 1 --table fleet.csv --reports out", 5);
-    assert!(why.contains("plant01.json: cannot be written"), "{why}");
+    folder.assert_refused(
+        "fit --each logs/plant*.csv --na 1 --nb 1 --table fleet.csv --reports out",
+        5,
+        "plant01.json: cannot be written",
+    );
     assert!(!folder.names().contains(&"fleet.csv".to_owned()));
 }
 

@@ -97,7 +97,7 @@ fn every_verb_takes_the_report() {
     folder.write("inputs.csv", inputs);
     let run = folder.done("simulate report.json inputs.csv --time t");
     assert!(run.stdout.lines().nth(1).is_some_and(|line| line.starts_with("0.0,,")), "{}", run.stdout);
-    assert!(folder.refused("predict report.json inputs.csv --time t", 3).contains("no output 'i'"));
+    folder.assert_refused("predict report.json inputs.csv --time t", 3, "no output 'i'");
     let refusals = [
         ("simulate report.json log.csv --time t --draws 5", 3, "is of polynomial models"),
         ("track log.csv --time t --warm report.json", 3, "a tracker is of polynomial models"),
@@ -107,8 +107,7 @@ fn every_verb_takes_the_report() {
         ("validate report.json log.csv --time t --require stable", 2, "stable"),
     ];
     for (line, code, words) in refusals {
-        let message = folder.refused(line, code);
-        assert!(message.contains(words), "{line}: {message}");
+        folder.assert_refused(line, code, words);
     }
 }
 
@@ -138,7 +137,7 @@ fn linear_equations_have_responses() {
 
     let (folder, _) = fitted("battery", "1..600", "--html page.html");
     for verb in ["bode", "step", "impulse"] {
-        assert!(folder.refused(&format!("{verb} report.json"), 3).contains("are not linear"));
+        folder.assert_refused(&format!("{verb} report.json"), 3, "are not linear");
     }
     assert!(!folder.read("page.html").contains("Frequency response"));
 }
@@ -178,9 +177,9 @@ fn several_logs_begin_anew_and_clocks_may_be_irregular() {
     let run = folder.run("compare thin.json even.json thin.csv --time t");
     assert_eq!(run.code, 0, "{}", run.stderr);
     // A model of polynomials needs an even clock.
-    assert!(folder.refused("fit thin.csv --time t -u i -y v --na 1 --nb 1", 3).contains("not uniform"));
+    folder.assert_refused("fit thin.csv --time t -u i -y v --na 1 --nb 1", 3, "not uniform");
     folder.done("fit log.csv --time t -u i -y v --na 1 --nb 1 --report arx.json");
-    assert!(folder.refused("compare thin.json arx.json thin.csv --time t", 3).contains("arx.json"));
+    folder.assert_refused("compare thin.json arx.json thin.csv --time t", 3, "arx.json");
 }
 
 #[test]

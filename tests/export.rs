@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use crate::c_library::{Precision, done, library};
 use crate::harness::Folder;
+use crate::signals::Random;
 
 /// What C has to be compiled with.
 const STRICT: [&str; 7] = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wpedantic", "-Werror", "-O2"];
@@ -151,11 +152,10 @@ fn models_of_other_kinds_say_what_the_library_does() {
 #[test]
 fn nonlinear_models_say_what_the_library_does() {
     // y(t) = 0.6 y(t-1) + 0.3 u(t-1)^2 - 0.1 y(t-1) u(t-1), and a little of what looks like noise.
-    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, 1_u32);
+    let (mut text, mut y, mut u, mut random) = ("t,u,y\n".to_owned(), 0.0_f64, 0.0_f64, Random::new(1));
     for t in 0..400 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.01 * f64::from(random >> 16 & 0xff) / 256.0;
-        u = f64::from(random >> 8) / f64::from(1 << 23) - 1.0;
+        y = 0.6 * y + 0.3 * u * u - 0.1 * y * u + 0.005 * random.uniform();
+        u = random.uniform();
         text += &format!("{t},{u},{y}\n");
     }
     let folder = Folder::with_log(text);
@@ -218,12 +218,9 @@ fn models_in_equations_say_what_the_library_does() {
 }
 
 /// Equations of so many states and inputs, random but stable, with a log along which they run.
-fn random_equations(seed: u32) -> (String, String) {
-    let mut random = seed.wrapping_mul(2_654_435_761).wrapping_add(1);
-    let mut below = |count: usize| {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (random >> 8) as usize % count
-    };
+fn random_equations(seed: u64) -> (String, String) {
+    let mut random = Random::new(seed);
+    let mut below = |count: usize| random.below(count);
     let (states, inputs, outputs, substeps) = (1 + below(6), below(4), 1 + below(2), 1 + below(3));
     let kind = ["derivative", "next"][below(2)];
     let line = |text: &mut String, line: String| *text += &(line + "\n");
@@ -473,7 +470,7 @@ fn nearest_neighbours_are_for_rust_alone() {
         "export r.json dc_motor.csv --time t --rows 200..300 --what predictor --precision f64 --name model";
     folder.done(&format!("{export} --to rust"));
     rustc(&folder, "model");
-    assert!(folder.refused(&format!("{export} --to c"), 2).contains("nearest neighbours"));
+    folder.assert_refused(&format!("{export} --to c"), 2, "nearest neighbours");
 }
 
 /// Takes 17 s: four estimators in Rust and C, each built with the library that it steps.
@@ -492,8 +489,11 @@ fn estimators_go_on_from_the_fit() {
     }
     folder.done("fit dc_motor.csv --time t --model oe --nb 2 --nf 2 --report r.json");
     for language in ["rust", "c"] {
-        let message = folder.refused(&format!("export r.json --to {language} --what recursive"), 3);
-        assert!(message.contains("can be tracked"), "{message}");
+        folder.assert_refused(
+            &format!("export r.json --to {language} --what recursive"),
+            3,
+            "can be tracked",
+        );
     }
 }
 
@@ -587,8 +587,11 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
         assert!(run.stderr.contains(words), "{line}: {}", run.stderr);
     }
     folder.done("fit dc_motor.csv --time t --na 2 --nb 2 --nk 3 --detrend linear --report line.json");
-    let message = folder.refused("export line.json --to rust --what simulator", 3);
-    assert!(message.contains("is a line in the time of its log"), "{message}");
+    folder.assert_refused(
+        "export line.json --to rust --what simulator",
+        3,
+        "is a line in the time of its log",
+    );
     let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
     assert_eq!(after, before);
 }
@@ -596,11 +599,10 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
 #[test]
 fn controllers_control() {
     // y(t) - 20 = 0.9 (y(t-1) - 20) + 0.2 (u(t-1) - 50), without noise but for a little.
-    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, 1_u32);
+    let (mut text, mut y, mut u, mut random) = ("u,y\n".to_owned(), 20.0_f64, 50.0_f64, Random::new(1));
     for _ in 0..400 {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 0.001 * f64::from(random >> 16 & 0xff) / 256.0;
-        u = 50.0 + f64::from(random >> 28) - 7.5;
+        y = 20.0 + 0.9 * (y - 20.0) + 0.2 * (u - 50.0) + 5e-4 * random.uniform();
+        u = 50.0 + 7.5 * random.uniform();
         text += &format!("{u},{y}\n");
     }
     let folder = Folder::with_log(text);
@@ -634,13 +636,15 @@ fn controllers_control() {
     // With a log there is a test vector.
     goes_round(&folder, "c.json", "log.csv --sample-time 1", &["controller"]);
     assert!(folder.read("model.csv").starts_with("u1,y1,set_point1,expected1\n"));
-    let message = folder.refused("export c.json log.csv --sample-time 2 --to c --what controller", 3);
-    assert!(message.contains("the controller's 1 s"), "{message}");
+    folder.assert_refused(
+        "export c.json log.csv --sample-time 2 --to c --what controller",
+        3,
+        "the controller's 1 s",
+    );
     for (line, words) in [
         ("c.json --to c --what predictor", "a controller is exported as no predictor; take controller"),
         ("r.json --to c --what controller", "a model is no controller"),
     ] {
-        let message = folder.refused(&format!("export {line}"), 2);
-        assert!(message.contains(words), "{message}");
+        folder.assert_refused(&format!("export {line}"), 2, words);
     }
 }

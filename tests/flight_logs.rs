@@ -278,8 +278,7 @@ fn what_is_not_there_or_does_not_go_together_is_refused() {
         (format!("track flight.ulg {channels} --na 1 --nb 1"), 3, "name columns of one topic"),
     ];
     for (line, code, words) in cases {
-        let said = folder.refused(&line, code);
-        assert!(said.contains(words), "{line}: {said}");
+        folder.assert_refused(&line, code, words);
     }
 }
 

@@ -13,6 +13,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 
 use crate::harness::HANGS;
+use crate::signals::Random;
 
 #[path = "../fuzz/src/lib.rs"]
 #[expect(unreachable_pub, reason = "to the fuzzer it is a crate")]
@@ -40,17 +41,7 @@ const WORDS: [i64; 8] = [0, 1, -1, i64::MAX, i64::MIN, i32::MAX as i64, 1 << 40,
 /// More failures than these are not told.
 const MOST_TOLD: usize = 5;
 
-/// A deterministic stream of numbers (xorshift).
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 33) as usize % limit.max(1)
-    }
-
+impl Random {
     /// A place in some bytes, and one after it that is not far.
     fn range(&mut self, bytes: &[u8], most: usize) -> std::ops::Range<usize> {
         let start = self.below(bytes.len());
@@ -133,7 +124,7 @@ fn fuzzed(target: &str, mutations: usize, work: fn(&[u8])) {
     });
     let mut failed = Vec::new();
     for (name, seed) in &seeds {
-        let mut dice = Dice(0x9e37_79b9_7f4a_7c15);
+        let mut dice = Random::new(1);
         for number in 0..=mutations * more {
             let mut bytes = seed.clone();
             if number > 0 {

@@ -115,6 +115,13 @@ impl Folder {
         assert_eq!(run.code, code, "thetahat {line}: {}", run.stderr);
         run.refusal()
     }
+
+    /// Runs the program, which must refuse with this exit code and one line that has these words.
+    #[track_caller]
+    pub(crate) fn assert_refused(&self, line: &str, code: i32, words: &str) {
+        let said = self.refused(line, code);
+        assert!(said.contains(words), "thetahat {line}: '{words}' is not in: {said}");
+    }
 }
 
 /// Gives all that this process starts the default signals, whatever it was started with itself: a script has its jobs

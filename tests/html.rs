@@ -14,6 +14,7 @@ use thetahat::report::{Plan, Report, Validated, ValidationPlan, identify, valida
 use crate::browser::Browser;
 use crate::fit_reference::folder_with;
 use crate::harness::{Folder, Run};
+use crate::signals::Random;
 
 /// Names that would do harm if they were taken for anything but names.
 const INPUT: &str = "</script><img src=x onerror=\"window.__hacked=1\">";
@@ -23,19 +24,9 @@ const MODEL: &str = "<i>model<script>'";
 /// The file's name up to where a shell wants it quoted.
 const BEGINNING: &str = "<img src=x onerror=window.__hacked=1>\"🚀";
 
-/// Numbers that look random: the same everywhere.
-fn noise(seed: u64, count: usize) -> Vec<f64> {
-    let mut state = seed;
-    let mut next = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((state >> 33) as f64 / (1_u64 << 30) as f64) - 1.0
-    };
-    (0..count).map(|_| next()).collect()
-}
-
 /// Input and output of a second-order system, with a gap in the output and a value that stands out of it by `peak`.
 fn signals(rows: usize, peak: f64) -> [Vec<f64>; 2] {
-    let (source, e) = (noise(1, rows), noise(2, rows));
+    let (source, e) = (Random::new(1).signal(rows), Random::new(2).signal(rows));
     let u: Vec<f64> = (0..rows).map(|t| if source[t / 9 * 9] > 0.0 { 3.0 } else { 1.0 }).collect();
     let mut y = vec![20.0; rows];
     for t in 2..rows {

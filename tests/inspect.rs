@@ -234,8 +234,7 @@ fn all_columns_of_numbers_are_looked_at() {
     let line = folder.refused("inspect log.csv -u note", 3);
     assert!(line.contains("log.csv:2:") && line.contains("column 'note'"), "{line}");
     // Words among numbers are a fault and not another kind of column.
-    let line = Folder::with_log("u,y\n1,2\n3,broken\n").refused("inspect log.csv", 3);
-    assert!(line.contains("log.csv:3:3"), "{line}");
+    Folder::with_log("u,y\n1,2\n3,broken\n").assert_refused("inspect log.csv", 3, "log.csv:3:3");
 }
 
 #[test]
@@ -329,8 +328,7 @@ fn small_and_odd_logs() {
         ("u,y\n1,2\n", "--html log.csv", 2, "replaced"),
     ] {
         let folder = Folder::with_log(log);
-        let line = folder.refused(&format!("inspect log.csv {options}"), code);
-        assert!(line.contains(word), "{word}: {line}");
+        folder.assert_refused(&format!("inspect log.csv {options}"), code, word);
         assert_eq!(folder.read("log.csv"), log);
     }
     Folder::new().refused("inspect nowhere.csv", 5);
@@ -421,7 +419,7 @@ fn one_step_is_no_sample_of_feedback_and_delays() {
 fn findings_name_their_channels_and_rows() {
     // Values that are missing, a sensor at its limit, a time that jumps and an outlier.
     let mut random = crate::signals::Random::new(12);
-    let u: Vec<f64> = (0..400).map(|_| random.uniform()).collect();
+    let u: Vec<f64> = random.signal(400);
     let mut y: Vec<f64> =
         (0..400).map(|row| 3.0 * (0.05 * row as f64).sin() + 0.01 * random.uniform()).collect();
     y.iter_mut().for_each(|value| *value = value.min(2.5));

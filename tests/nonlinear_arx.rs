@@ -3,20 +3,16 @@
 use serde_json::Value;
 
 use crate::harness::{Folder, number};
-use crate::signals::csv;
+use crate::signals::{Random, csv};
 
 /// A plant whose gain grows with its input.
 fn plant(rows: usize) -> String {
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-    };
-    let u: Vec<f64> = (0..rows).map(|_| random()).collect();
+    let mut random = Random::new(1);
+    let u: Vec<f64> = random.signal(rows);
     let mut y = vec![3.0];
     for k in 1..rows {
         let x = u[k - 1];
-        y.push(3.0 + 0.5 * (y[k - 1] - 3.0) + x + 0.4 * x * x + 0.05 * random());
+        y.push(3.0 + 0.5 * (y[k - 1] - 3.0) + x + 0.4 * x * x + 0.05 * random.uniform());
     }
     csv(&[("u", &u), ("y", &y)])
 }
@@ -65,8 +61,11 @@ fn every_verb_takes_a_network() {
         assert!(run.stderr.lines().count() < 4, "{options}: {}", run.stderr);
     }
     for wrong in ["-1", "nan", "0.1,0.2"] {
-        let said = folder.refused(&format!("filter model.json log.csv --measurement-noise {wrong}"), 2);
-        assert!(said.contains("--measurement-noise"), "{said}");
+        folder.assert_refused(
+            &format!("filter model.json log.csv --measurement-noise {wrong}"),
+            2,
+            "--measurement-noise",
+        );
     }
 }
 
@@ -246,8 +245,7 @@ fn bad_logs_are_told() {
     ] {
         for map in maps {
             let line = format!("fit {log}.csv --narx {map} --ny 1 --nu 1 --sample-time 1 {options}");
-            let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
-            assert!(said.contains(words), "{line}: {said}");
+            folder.assert_refused(&format!("{line} --report report.json --html page.html"), code, words);
         }
     }
     for (log, options, code, words) in [
@@ -266,8 +264,7 @@ fn bad_logs_are_told() {
         ("good", "--narx knn --units 35", 4, "39 samples are too few"),
     ] {
         let line = format!("fit {log}.csv --ny 1 --nu 1 --sample-time 1 {options}");
-        let said = folder.refused(&format!("{line} --report report.json --html page.html"), code);
-        assert!(said.contains(words), "{line}: {said}");
+        folder.assert_refused(&format!("{line} --report report.json --html page.html"), code, words);
     }
     assert!(folder.names().iter().all(|name| name.ends_with(".csv")), "{:?}", folder.names());
 }
@@ -337,12 +334,10 @@ fn products_are_taken_by_name() {
 #[test]
 fn several_outputs_and_expressions_take_every_verb() {
     let text = plant(900);
-    let mut state = 5_u32;
+    let mut random = Random::new(5);
     let (mut level, mut before) = (4.0_f64, 0.0);
     let lines = text.lines().skip(1).map(|line| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        level +=
-            0.3 * (2.0 + before - level.sqrt()) + 1e-3 * (f64::from(state >> 8) / f64::from(1 << 23) - 1.0);
+        level += 0.3 * (2.0 + before - level.sqrt()) + 1e-3 * random.uniform();
         before = line.split(',').next().and_then(|cell| cell.parse().ok()).expect("it is a number");
         format!("{line},{level}\n")
     });
@@ -495,15 +490,11 @@ fn trackers_take_functions() {
 /// every verb takes them.
 #[test]
 fn splines_find_what_bends() {
-    let mut state = 7_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1 << 23) - 1.0
-    };
-    let u: Vec<f64> = (0..1500).map(|_| random()).collect();
+    let mut random = Random::new(7);
+    let u: Vec<f64> = random.signal(1500);
     let mut y = vec![0.0];
     for k in 1..1500 {
-        y.push(0.4 * y[k - 1] + (3.0 * u[k - 1]).tanh() + 0.02 * random());
+        y.push(0.4 * y[k - 1] + (3.0 * u[k - 1]).tanh() + 0.02 * random.uniform());
     }
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     let common = "--ny 1 --nu 1 --sample-time 1 --estimate 1..1000 --validate 1001..1500";

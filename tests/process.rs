@@ -5,6 +5,7 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use crate::harness::{Folder, number};
+use crate::signals::Random;
 
 const TCLAB: &str = "log.csv --time t -u q1 -y t1";
 
@@ -96,16 +97,14 @@ fn every_verb_takes_a_process() {
 #[test]
 fn a_frequency_response_makes_a_process() {
     let mut log = "u,y\n".to_owned();
-    let (mut y, mut random) = (0.0, 1_u32);
+    let (mut y, mut random) = (0.0, Random::new(1));
     let pole = (-0.2_f64).exp();
     let mut held = 0.0;
     for k in 0..4000 {
         if k % 3 == 0 {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            held = if random >> 31 == 0 { 1.0 } else { -1.0 };
+            held = random.uniform().signum();
         }
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        writeln!(log, "{held},{}", y + 1e-6 * f64::from(random >> 16)).expect("memory");
+        writeln!(log, "{held},{}", y + 0.03 * random.uniform()).expect("memory");
         y = pole * y + 2.0 * (1.0 - pole) * held;
     }
     let folder = Folder::with_log(log);
@@ -133,8 +132,7 @@ fn a_frequency_response_makes_a_process() {
     let outside = |model: usize| number(&found, &format!("/models/{model}/response/0/outside"));
     assert!(outside(0) < 30.0 && outside(1) > 100.0, "{table}");
     folder.done("validate model.json log.csv --sample-time 1");
-    let error = folder.refused("fit --from response.json --structure p1d -u v", 2);
-    assert!(error.contains("none called 'v'"), "{error}");
+    folder.assert_refused("fit --from response.json --structure p1d -u v", 2, "none called 'v'");
     folder.refused("fit --from log.csv --structure p1d", 3);
     folder.refused("fit --from nowhere.json --structure p1d", 5);
     for line in ["fit --from response.json", "fit --from response.json log.csv --structure p1d", "fit"] {
@@ -185,8 +183,7 @@ fn what_cannot_be_is_told() {
         ("--structure p1d --estimate 1..900", 3, "900"),
     ] {
         let before = folder.names();
-        let error = folder.refused(&format!("fit {TCLAB} {options} --report model.json"), code);
-        assert!(error.contains(words), "{options}: {error}");
+        folder.assert_refused(&format!("fit {TCLAB} {options} --report model.json"), code, words);
         assert_eq!(folder.names(), before);
     }
     // What is of other models.
@@ -230,14 +227,13 @@ fn a_step_test_without_orders_is_described_by_a_process() {
 
 /// 20/(s^2 + 2 s + 20) e^(-0.13 s) on an uneven clock, its input moving from the first row on.
 fn resonance(folder: &Folder) {
-    let (mut text, mut random, mut steps) = ("t,u,y\n".to_owned(), 1_u32, Vec::new());
+    let (mut text, mut random, mut steps) = ("t,u,y\n".to_owned(), Random::new(1), Vec::new());
     let mut level = 0.0;
     let damped = 19.0_f64.sqrt();
     for row in 0..500 {
         let time = 0.05 * f64::from(row) + 0.01 * f64::from(row % 3);
         if row % 7 == 0 {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let next = f64::from(random >> 16) / 32_768.0 - 1.0;
+            let next = random.uniform();
             steps.push((time, next - level));
             level = next;
         }
@@ -282,7 +278,7 @@ fn transfer_functions_are_found_in_every_verb() {
         value(&report, "b0").0 / value(&report, "a0").0,
         1e-9,
     );
-    assert!(folder.refused("tune model.json", 2).contains("tf20d"));
+    folder.assert_refused("tune model.json", 2, "tf20d");
 
     // What is no resonance comes to the same as lags.
     let lags = folder.fit(&format!("{TCLAB} --structure p2"));
@@ -298,13 +294,12 @@ fn transfer_functions_are_found_in_every_verb() {
     near(value(&found, "a0").0, 20.0, 0.1);
 
     // An integrator, driven from the first row on by an input that rests at 0.3.
-    let (mut text, mut random, mut state) = ("u,y\n".to_owned(), 1_u32, [0.0, 0.0]);
-    let decay = (-0.2_f64).exp();
+    let (mut text, mut random, mut state) = ("u,y\n".to_owned(), Random::new(1), [0.0, 0.0]);
+    let (mut u, decay) = (-1.0, (-0.2_f64).exp());
     for row in 0..400 {
-        if row % 5 == 0 {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if row > 0 && row % 5 == 0 {
+            u = random.uniform().signum();
         }
-        let u = if random >> 31 == 1 { 1.0 } else { -1.0 };
         let noise = f64::from((row * 7919) % 101 - 50) * 4e-4;
         writeln!(text, "{u},{}", state[0] + noise).expect("memory");
         // 1/(s (s + 1)) of a held input, less 0.3.
@@ -336,8 +331,7 @@ fn transfer_functions_are_found_in_every_verb() {
         ("--structure tf2", "no structure of a process"),
         ("--model ss --np 2", "--np"),
     ] {
-        let refusal = folder.refused(&format!("fit {TCLAB} {options}"), 2);
-        assert!(refusal.contains(words), "{options}: {refusal}");
+        folder.assert_refused(&format!("fit {TCLAB} {options}"), 2, words);
     }
     for options in ["--nz 1", "--delay", "--np 2 --structure p1d", "--np 2 --na 1"] {
         assert_eq!(folder.run(&format!("fit {TCLAB} {options}")).code, 2, "{options}");

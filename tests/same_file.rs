@@ -76,8 +76,7 @@ fn an_output_that_cannot_be_written_is_told_before_anything_is_read() {
         for (out, why) in
             [("nope/x", "nope/x: cannot be written: its folder is not there"), ("folder", "folder: cannot")]
         {
-            let refusal = folder.refused(&line.replace("OUT", out), 5);
-            assert!(refusal.contains(why), "{line}: {refusal}");
+            folder.assert_refused(&line.replace("OUT", out), 5, why);
         }
     }
     assert_eq!(folder.names(), names);
@@ -131,8 +130,7 @@ fn two_outputs_are_two_files() {
         "filter model.json log.csv -o one --summary two",
         "filter model.json log.csv --summary -",
     ] {
-        let refusal = folder.refused(line, 2);
-        assert!(refusal.contains("is named for two outputs"), "{line}: {refusal}");
+        folder.assert_refused(line, 2, "is named for two outputs");
     }
     let mut command = folder.command("track log.csv --na 1 --nb 1 --summary one");
     command.stdout(OpenOptions::new().append(true).open(folder.path("two")).unwrap());

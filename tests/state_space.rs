@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use crate::fit_reference::{folder_with, folder_with_any};
 use crate::harness::{Folder, number};
+use crate::signals::Random;
 
 const MOTOR: &str = "log.csv --time t -u u -y i,speed";
 
@@ -253,13 +254,9 @@ fn logs_that_say_too_little_are_refused() {
     folder.write("short.csv", short);
     let refusal = folder.run("fit short.csv -u u -y y1,y2 --sample-time 1 --past 5 --report r.json");
     assert!(refusal.code == 4 && refusal.stderr.contains("more samples than signals"), "{refusal:?}");
-    let (mut dependent, mut random, mut x) = ("u,y1,y2,y3\n".to_owned(), 1_u32, 0.0);
-    let mut draw = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 16) / 32_768.0 - 1.0
-    };
+    let (mut dependent, mut random, mut x) = ("u,y1,y2,y3\n".to_owned(), Random::new(1), 0.0);
     for _ in 0..300 {
-        let (u, y) = (draw(), x + 0.1 * draw());
+        let (u, y) = (random.uniform(), x + 0.1 * random.uniform());
         x = 0.8 * x + u;
         writeln!(dependent, "{u},{y},{},4", 2.0 * y + 1.0).expect("memory");
     }
@@ -272,8 +269,11 @@ fn logs_that_say_too_little_are_refused() {
     let refusal = folder.run("fit dependent.csv -u u -y y1,y3 --sample-time 1 --report r.json");
     assert!(refusal.code == 4 && refusal.stderr.contains("'y3' is constant"), "{refusal:?}");
     folder.write("huge.csv", "u,y1,y2\n1,2e200,1\n3,-1e200,4\n2,7e200,1\n5,1,2\n");
-    let refusal = folder.refused("fit huge.csv -u u -y y1,y2 --sample-time 1 --report r.json", 3);
-    assert!(refusal.contains("squares of 'y1' leave the range of numbers"), "{refusal}");
+    folder.assert_refused(
+        "fit huge.csv -u u -y y1,y2 --sample-time 1 --report r.json",
+        3,
+        "squares of 'y1' leave the range of numbers",
+    );
     assert!(!folder.names().contains(&"r.json".to_owned()));
 }
 
@@ -295,8 +295,8 @@ fn states_that_matter_least_are_left_out() {
     folder.done("reduce p.json --order 2 --out q.json");
     folder.done("predict q.json log.csv --time t --out p.csv");
     folder.done("fit log.csv --time t -u u -y speed --narx poly --report n.json");
-    assert!(folder.refused("reduce n.json", 3).contains("states are left out of models in state space"));
-    assert!(folder.refused("reduce r.json --order 9 --out x.json", 2).contains("--order"));
+    folder.assert_refused("reduce n.json", 3, "states are left out of models in state space");
+    folder.assert_refused("reduce r.json --order 9 --out x.json", 2, "--order");
     assert!(!folder.names().contains(&"x.json".to_owned()));
 }
 
@@ -445,8 +445,11 @@ fn an_arx_model_has_several_outputs() {
     }
     folder.write("exact.csv", exact);
     folder.done("fit exact.csv -y y1,y2 --sample-time 1 --na 1..2 --nb 1..2 --report e.json");
-    let late = folder.refused(&format!("fit {MOTOR} --na 2 --nb 2 --nk 5000 --report x.json"), 4);
-    assert!(late.contains("no segment is longer than the delays"), "{late}");
+    folder.assert_refused(
+        &format!("fit {MOTOR} --na 2 --nb 2 --nk 5000 --report x.json"),
+        4,
+        "no segment is longer than the delays",
+    );
     // An input that waits is known to.
     let waits = folder.fit(&format!("{MOTOR} --na 2 --nb 2 --nk 3"));
     assert_eq!(waits["estimation"]["nk"], serde_json::json!([3]));
@@ -468,8 +471,7 @@ fn an_arx_model_has_several_outputs() {
         ("--na 2 --nb 2 --nk 3..1", "--nk: '3..1'"),
         ("--model ss --nk 1..2", "a range is for all inputs of an ARX model"),
     ] {
-        let refusal = folder.refused(&format!("fit {MOTOR} {options}"), 2);
-        assert!(refusal.contains(word), "{refusal}");
+        folder.assert_refused(&format!("fit {MOTOR} {options}"), 2, word);
     }
     assert_eq!(waits["model"]["delays"], serde_json::json!([2]));
     for (options, word) in [

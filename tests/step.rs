@@ -120,12 +120,8 @@ fn sines_tell_the_time_constant() {
     assert!((number(&found, "/value/value") - 20.98).abs() < 0.1, "{found}");
     assert!(folder.done("step response.json").stdout.contains("phase of -45 degrees *"));
     assert!(folder.read("page.html").contains("phase of -45 degrees"));
-    assert!(folder.refused("step response.json -u w", 2).contains("it is from: u"));
-    assert!(
-        folder
-            .refused("step response.json --samples 5", 2)
-            .contains("--samples is for the report of a model")
-    );
+    folder.assert_refused("step response.json -u w", 2, "it is from: u");
+    folder.assert_refused("step response.json --samples 5", 2, "--samples is for the report of a model");
     // Half a period is no sine.
     let half: Vec<f64> = (0..100).map(|t| (TAU * f64::from(t) / 200.0).sin()).collect();
     folder.write("half.csv", csv(&[("u", &half), ("y", &half)]));
@@ -166,8 +162,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         ("step brace.json -o new.csv", 3, "brace.json: this is not a thetahat report"),
         ("step nowhere.csv", 5, "nowhere.csv"),
     ] {
-        let said = folder.refused(line, code);
-        assert!(said.contains(says), "{line}: {said}");
+        folder.assert_refused(line, code, says);
         assert_eq!(folder.names(), before, "{line}");
     }
 }
@@ -176,12 +171,15 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
 fn public_logs_without_a_regime_are_refused() {
     let folder = folder_with("tclab_siso_step.csv");
     // Its clock is irregular, and each step ends after less than two time constants.
-    let said = folder.refused("step log.csv --time t -u q1 -y t1", 4);
-    assert!(said.contains("step 1 (row 12): the output does not reach a regime"), "{said}");
+    folder.assert_refused(
+        "step log.csv --time t -u q1 -y t1",
+        4,
+        "step 1 (row 12): the output does not reach a regime",
+    );
     let folder = folder_with("hair_dryer.csv");
-    assert!(folder.refused("step log.csv", 4).contains("no step can be evaluated"));
+    folder.assert_refused("step log.csv", 4, "no step can be evaluated");
     let Some(folder) = folder_with_any("heating_system.csv") else { return };
-    assert!(folder.refused("step log.csv --time t", 4).contains("step 1 (row 201)"));
+    folder.assert_refused("step log.csv --time t", 4, "step 1 (row 201)");
 }
 
 #[test]

@@ -104,8 +104,11 @@ fn spikes_do_not_spoil_the_model_where_a_rule_for_them_is_asked_for() {
             assert!(number(&lines[k], "/nis") > 25.0);
         }
     }
-    let refusal = folder.refused("track log.csv --na 2 --nb 2,1 --outliers huber:0.1", 2);
-    assert!(refusal.contains("--outliers: 'huber:0.1' is no rule; write used, huber:THRESHOLD"), "{refusal}");
+    folder.assert_refused(
+        "track log.csv --na 2 --nb 2,1 --outliers huber:0.1",
+        2,
+        "--outliers: 'huber:0.1' is no rule; write used, huber:THRESHOLD",
+    );
 }
 
 #[test]
@@ -436,23 +439,26 @@ fn several_outputs_go_on_from_a_state() {
 #[test]
 fn several_outputs_are_refused_where_a_model_has_one() {
     let folder = Folder::with_log(two_outputs(50));
-    let usage = |line: &str| refused(&folder, &format!("log.csv {line}"), 2);
-    assert!(usage("-y y1,y2 --na 1 --nb 1 --nc 1").contains("--nc: several outputs are tracked as ARX"));
-    assert!(usage("-y y1,y2 --narx poly").contains("--narx: several outputs"));
-    assert!(usage("-y y1,y1 --na 1 --nb 1").contains("'y1' is named twice"));
-    assert!(usage("-y y1 --na 1 --nb 1 --couple full").contains("--couple is for several outputs"));
-    assert!(usage("-y y1,y2 --na 1 --nb 1 --couple auto").contains("'auto' is neither full nor none"));
-    assert!(usage("-y y1,y2 --na 1 --nb 1 --scale y1=1").contains("has none; give one for each channel"));
     folder.done("fit log.csv -y y1 --na 1 --nb 1 --report one.json");
-    assert!(usage("-y y1,y2 --warm one.json").contains("--output: 2 of the 1 outputs of --warm"));
     folder.done("fit log.csv -y y1,y2 --na 1 --nb 1 --report two.json");
-    assert!(usage("-y y1 --warm two.json").contains("--output: 1 of the 2 outputs of --warm"));
-    assert!(usage("--warm two.json --couple none").contains("--couple: that of --warm is taken"));
     folder.done("fit log.csv -y y1,y2 --model ss --order 2 --report states.json");
-    let data = |line: &str| refused(&folder, &format!("log.csv {line}"), 3);
-    assert!(data("--warm states.json").contains("of several outputs only an ARX model can be tracked"));
     folder.done("reduce two.json --order 1 -o reduced.json");
-    assert!(data("--warm reduced.json").contains("the matrices are not those of A and B"));
+    for (code, line, words) in [
+        (2, "-y y1,y2 --na 1 --nb 1 --nc 1", "--nc: several outputs are tracked as ARX"),
+        (2, "-y y1,y2 --narx poly", "--narx: several outputs"),
+        (2, "-y y1,y1 --na 1 --nb 1", "'y1' is named twice"),
+        (2, "-y y1 --na 1 --nb 1 --couple full", "--couple is for several outputs"),
+        (2, "-y y1,y2 --na 1 --nb 1 --couple auto", "'auto' is neither full nor none"),
+        (2, "-y y1,y2 --na 1 --nb 1 --scale y1=1", "has none; give one for each channel"),
+        (2, "-y y1,y2 --warm one.json", "--output: 2 of the 1 outputs of --warm"),
+        (2, "-y y1 --warm two.json", "--output: 1 of the 2 outputs of --warm"),
+        (2, "--warm two.json --couple none", "--couple: that of --warm is taken"),
+        (3, "--warm states.json", "of several outputs only an ARX model can be tracked"),
+        (3, "--warm reduced.json", "the matrices are not those of A and B"),
+    ] {
+        let message = refused(&folder, &format!("log.csv {line}"), code);
+        assert!(message.contains(words), "{line}: {message}");
+    }
 }
 
 /// What a fit of the first half knows goes on in the second, to the fit of both halves.
@@ -500,38 +506,44 @@ fn several_outputs_go_on_from_a_fit() {
 fn bad_options_and_logs_are_refused() {
     let folder = Folder::with_log("u,y\n1,2\n2,3\n");
     let usage = |line: &str| refused(&folder, &format!("log.csv {line}"), 2);
-    assert!(usage("").contains("the orders are missing: give --na and --nb, or --warm"));
-    assert!(usage("--na 2").contains("--nb is missing"));
-    assert!(usage("--nb 1,2").contains("--nb: 2 values for 1 inputs"));
-    assert!(usage("--nb 1 --forgetting 0.2").contains("--forgetting: "));
-    assert!(usage("--nb 1 --forgetting fast").contains("--forgetting: 'fast' is no policy"));
-    assert!(usage("--nb 1 --forgetting 0.99,0.99").contains("is there twice"));
-    assert!(usage("--nb 1 --start cold").contains("--start: 'cold' is none"));
-    assert!(usage("--nb 1 --alarm 1").contains("--alarm: 1 is not a number of samples"));
-    assert!(usage("--nb 1 --scale u=1").contains("--scale: 'y' has none"));
-    assert!(usage("--nb 1 --scale x=1 --scale u=1 --scale y=1").contains("--scale: 'x' is no channel"));
-    assert!(usage("--nb 1 --offset u").contains("--offset u: write it as NAME=VALUE"));
-    assert!(usage("--nb 1 --model armax").contains("--model armax needs --nc"));
-    assert!(usage("--nb 1 --nc 1 --model arx").contains("--nc: an arx model has no C"));
-    assert!(usage("--nb 1 --dead-zone -1").contains("--dead-zone: "));
-    assert!(usage("--nb 1 --scale u=0 --scale y=1").contains("--scale u=0: give the typical magnitude"));
-    assert!(usage("--nb 1 -o log.csv").contains("would be replaced"));
-    assert!(usage("--nb 1 --state log.csv").contains("would be replaced"));
-    assert!(usage("--nb 1 --state -").contains("--state -: a state is kept in a file"));
-    assert!(usage("--nb 1 --state s --summary s").contains("s is named for two outputs"));
+    for (line, words) in [
+        ("", "the orders are missing: give --na and --nb, or --warm"),
+        ("--na 2", "--nb is missing"),
+        ("--nb 1,2", "--nb: 2 values for 1 inputs"),
+        ("--nb 1 --forgetting 0.2", "--forgetting: "),
+        ("--nb 1 --forgetting fast", "--forgetting: 'fast' is no policy"),
+        ("--nb 1 --forgetting 0.99,0.99", "is there twice"),
+        ("--nb 1 --start cold", "--start: 'cold' is none"),
+        ("--nb 1 --alarm 1", "--alarm: 1 is not a number of samples"),
+        ("--nb 1 --scale u=1", "--scale: 'y' has none"),
+        ("--nb 1 --scale x=1 --scale u=1 --scale y=1", "--scale: 'x' is no channel"),
+        ("--nb 1 --offset u", "--offset u: write it as NAME=VALUE"),
+        ("--nb 1 --model armax", "--model armax needs --nc"),
+        ("--nb 1 --nc 1 --model arx", "--nc: an arx model has no C"),
+        ("--nb 1 --dead-zone -1", "--dead-zone: "),
+        ("--nb 1 --scale u=0 --scale y=1", "--scale u=0: give the typical magnitude"),
+        ("--nb 1 -o log.csv", "would be replaced"),
+        ("--nb 1 --state log.csv", "would be replaced"),
+        ("--nb 1 --state -", "--state -: a state is kept in a file"),
+        ("--nb 1 --state s --summary s", "s is named for two outputs"),
+    ] {
+        let message = usage(line);
+        assert!(message.contains(words), "{line}: {message}");
+    }
     assert_eq!(folder.names(), ["log.csv"]);
 
-    let data = |log: &str, line: &str| {
+    for (log, line, words) in [
+        ("", "log.csv --nb 1", "the file is empty"),
+        ("u,y\n", "log.csv --nb 1", "there are no data rows"),
+        ("u,z\n1,2\n", "log.csv --nb 1", "no column is called y"),
+        ("v,y\n1,2\n", "log.csv --nb 1", "no column is called u"),
+        ("u,y\n1,2\n", "log.csv --nb 1 --time t", "there is no column 't'"),
+    ] {
         let folder = Folder::with_log(log);
         let message = refused(&folder, line, 3);
+        assert!(message.contains(words), "{log:?} {line}: {message}");
         assert_eq!(folder.names(), ["log.csv"]);
-        message
-    };
-    assert!(data("", "log.csv --nb 1").contains("the file is empty"));
-    assert!(data("u,y\n", "log.csv --nb 1").contains("there are no data rows"));
-    assert!(data("u,z\n1,2\n", "log.csv --nb 1").contains("no column is called y"));
-    assert!(data("v,y\n1,2\n", "log.csv --nb 1").contains("no column is called u"));
-    assert!(data("u,y\n1,2\n", "log.csv --nb 1 --time t").contains("there is no column 't'"));
+    }
     refused(&folder, "nothing.csv --nb 1", 5);
 
     // Too short or constant: every row is told, and the table says that there is no estimate.

@@ -313,20 +313,22 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
     let folder = Folder::with_log(csv(&[("u", &u), ("y", &y)]));
     folder.done(&format!("track log.csv {MODEL} --state state.json"));
     let before = folder.read("state.json");
-    let refused = |line: &str| {
+    let refused = |line: &str, words: &str| {
         let run = folder.run(&format!("track {line} --state state.json"));
-        assert_eq!((run.code, run.stdout.as_str()), (3, ""), "{}", run.stderr);
-        run.stderr
+        assert_eq!((run.code, run.stdout.as_str()), (3, ""), "{line}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{line}: '{words}' is not in: {}", run.stderr);
     };
-    assert!(
-        refused(&format!("log.csv {MODEL} --forgetting 0.9")).contains("--forgetting was 'exponential:0.99'")
-    );
-    assert!(refused("log.csv --na 2 --nb 1").contains("the model was"));
-    assert!(refused(&format!("log.csv {MODEL} --every 2")).contains("--every was '1' and is '2' now"));
     folder.write("other.csv", csv(&[("u", &y), ("y", &u)]));
-    assert!(refused(&format!("other.csv {MODEL}")).contains("other.csv:2: this is not row 1 of the log"));
     folder.write("short.csv", csv(&[("u", &u[..50]), ("y", &y[..50])]));
-    assert!(refused(&format!("short.csv {MODEL}")).contains("it ends before row 100"));
+    for (log, options, words) in [
+        ("log.csv", format!("{MODEL} --forgetting 0.9"), "--forgetting was 'exponential:0.99'"),
+        ("log.csv", "--na 2 --nb 1".to_owned(), "the model was"),
+        ("log.csv", format!("{MODEL} --every 2"), "--every was '1' and is '2' now"),
+        ("other.csv", MODEL.to_owned(), "other.csv:2: this is not row 1 of the log"),
+        ("short.csv", MODEL.to_owned(), "it ends before row 100"),
+    ] {
+        refused(&format!("{log} {options}"), words);
+    }
     assert_eq!(folder.read("state.json"), before);
 
     for (text, expected) in [
@@ -359,7 +361,7 @@ fn a_state_that_does_not_fit_is_refused_in_words() {
         (String::new(), "this is no state of thetahat track"),
     ] {
         folder.write("state.json", &text);
-        assert!(refused(&format!("log.csv {MODEL}")).contains(expected), "{expected}");
+        refused(&format!("log.csv {MODEL}"), expected);
         assert_eq!(folder.read("state.json"), text);
     }
     // Output that is shorter than the state says.
@@ -397,8 +399,7 @@ fn one_run_at_a_time_has_a_state_and_an_output() {
         ("other.json", "lines.jsonl", "lines.jsonl"),
         ("state.json", "lines.jsonl", "state.json"),
     ] {
-        let refusal = folder.refused(&line(state, out), 5);
-        assert!(refusal.contains(&format!("{name}: another run is writing it")), "{refusal}");
+        folder.assert_refused(&line(state, out), 5, &format!("{name}: another run is writing it"));
         assert_eq!((folder.read("state.json"), folder.read("lines.jsonl")), before);
     }
     assert_eq!(folder.names(), ["lines.jsonl", "log.csv", "state.json"]);

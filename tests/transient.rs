@@ -64,9 +64,10 @@ fn what_has_no_such_response_is_refused() {
     let folder = Folder::with_log(plain_log());
     folder.done("fit log.csv --na 2 --nb 0 --report series.json");
     for verb in ["step", "impulse"] {
-        let refusal = folder.refused(&format!("{verb} series.json"), 3);
-        assert!(
-            refusal.contains(&format!("series.json: the model has no inputs, so it has no {verb} response"))
+        folder.assert_refused(
+            &format!("{verb} series.json"),
+            3,
+            &format!("series.json: the model has no inputs, so it has no {verb} response"),
         );
         folder.refused(&format!("{verb} nowhere.json"), 5);
         assert_eq!(folder.run(&format!("{verb} series.json --samples 0")).code, 2);

@@ -55,8 +55,7 @@ fn what_cannot_be_tuned_is_told() {
         ("tune log.csv", 3, "not a thetahat report"),
         ("tune nowhere.json", 5, "cannot be read"),
     ] {
-        let error = folder.refused(&format!("{line} --responses r.csv --html h.html"), code);
-        assert!(error.contains(words), "{line}: {error}");
+        folder.assert_refused(&format!("{line} --responses r.csv --html h.html"), code, words);
         assert_eq!(folder.names(), before);
     }
     let run = folder.done("tune heater.json --controller pid");

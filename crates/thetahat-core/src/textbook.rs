@@ -80,6 +80,15 @@ pub(crate) fn random_covariance<const N: usize>(noise: &mut Noise) -> Square<N> 
     root * root.transpose() + 0.1 * Square::identity()
 }
 
+/// The largest difference of two covariance matrices, beside the variances of the two elements.
+pub(crate) fn difference<const N: usize>(a: &Square<N>, b: &Square<N>) -> f64 {
+    let share = |i: usize, j: usize| {
+        let change = (a[(i, j)] - b[(i, j)]).abs();
+        if change == 0.0 { 0.0 } else { change / (b[(i, i)] * b[(j, j)]).sqrt() }
+    };
+    (0..N * N).map(|k| share(k / N, k % N)).fold(0.0, f64::max)
+}
+
 /// The largest magnitude of an eigenvalue.
 pub(crate) fn spectral_radius<const N: usize>(matrix: &Square<N>) -> f64 {
     let (mut power, mut logarithm, mut exponent) = (*matrix, 0.0, 1.0);

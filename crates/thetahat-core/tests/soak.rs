@@ -8,6 +8,9 @@
 
 #[path = "soak/control.rs"]
 mod control;
+#[path = "../src/noise.rs"]
+#[expect(dead_code, reason = "the unit tests take more of it")]
+mod noise;
 
 use std::collections::VecDeque;
 
@@ -18,22 +21,18 @@ use thetahat_core::{
     RecursiveNarx, RecursiveOutputError, Scaling, Window, WindowedLeastSquares,
 };
 
+use noise::Noise;
+
 /// How many steps each run takes.
 fn steps() -> u64 {
     std::env::var("SOAK_STEPS")
         .map_or(1_000_000, |text| text.parse().expect("SOAK_STEPS is a number of steps"))
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014), uniform in -1 … 1.
-struct Noise(u64);
-
 impl Noise {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (bits >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
+    /// Uniform in -1 … 1, in single precision.
+    fn single(&mut self) -> f32 {
+        (self.bits() >> 40) as f32 / (1_u64 << 23) as f32 - 1.0
     }
 }
 
@@ -79,13 +78,13 @@ impl Plant {
             Input::Silent => [0.0; 4],
             Input::Held => self.held,
             Input::Rich => {
-                self.held = [0; 4].map(|_| self.noise.next());
+                self.held = [0; 4].map(|_| self.noise.single());
                 self.held
             }
         };
         let clean: f32 = scaled.iter().zip(truth(step)).map(|(scaled, truth)| scaled * truth).sum();
         let regressor = [0, 1, 2, 3].map(|index: usize| scaled[index] * SCALES[index]);
-        (regressor, clean + NOISE * 3.0_f32.sqrt() * self.noise.next())
+        (regressor, clean + NOISE * 3.0_f32.sqrt() * self.noise.single())
     }
 }
 
@@ -296,12 +295,12 @@ fn recursive_output_error() {
         for step in 0..steps() {
             let gain = if (step + 15_000) / 20_000 % 2 == 0 { 0.5 } else { 0.3 };
             x = [1.2 * x[0] - 0.5 * x[1] + gain * u, x[0]];
-            let measured = if step % 997 == 0 { f32::NAN } else { x[0] + 0.3 * noise.next() };
+            let measured = if step % 997 == 0 { f32::NAN } else { x[0] + 0.3 * noise.single() };
             model.measured(measured).expect("finite numbers");
             u = match input(step) {
                 Input::Silent => 0.0,
                 Input::Held => u,
-                Input::Rich => noise.next(),
+                Input::Rich => noise.single(),
             };
             model.applied(&[u]).expect("finite numbers");
             let parameters = model.estimator().parameters();
@@ -339,11 +338,11 @@ fn recursive_narx() {
     for step in 0..steps() {
         let gain = if (step + 15_000) / 20_000 % 2 == 0 { 0.5 } else { 0.3 };
         let theta = [0.02, 0.6, -0.2, gain, -0.05, 0.03, 0.1, 0.0, 0.05, 0.15];
-        let next = PRODUCTS.value(&theta, &z) + 0.01 * noise.next();
+        let next = PRODUCTS.value(&theta, &z) + 0.01 * noise.single();
         let now = match input(step) {
             Input::Silent => 0.0,
             Input::Held => z[2],
-            Input::Rich => noise.next(),
+            Input::Rich => noise.single(),
         };
         let missing = step % 997 == 0;
         let innovation = plant
@@ -413,7 +412,7 @@ fn kalman_filter() {
         if step % 10_000 < 9_000 {
             for (index, (sensor, double_sensor)) in sensors.iter().zip(&double_sensors).enumerate() {
                 let deviation = [1e-3, 1e-3, 10.0][index] * 3.0_f32.sqrt();
-                let y = Vector1::new(deviation * noise.next());
+                let y = Vector1::new(deviation * noise.single());
                 let innovation = single.correct(sensor, &SVector::zeros(), &y).unwrap();
                 assert!(innovation.nis.is_finite() && innovation.variance[0] > 0.0, "at {step}");
                 double.correct(double_sensor, &SVector::zeros(), &y.cast()).unwrap();

@@ -28,4 +28,9 @@ impl Noise {
     pub fn take(&mut self, count: usize) -> Vec<f64> {
         (0..count).map(|_| self.uniform()).collect()
     }
+
+    /// This many Gaussian ones.
+    pub fn take_normal(&mut self, count: usize) -> Vec<f64> {
+        (0..count).map(|_| self.normal()).collect()
+    }
 }

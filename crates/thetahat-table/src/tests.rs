@@ -12,6 +12,7 @@ use super::source::{Bytes, Source};
 use super::*;
 
 mod cut;
+pub(crate) mod dice;
 mod random;
 mod shapes;
 mod stream;

@@ -107,6 +107,8 @@ pub mod respond;
 pub mod select;
 pub mod spectrum;
 pub mod step_test;
+#[cfg(test)]
+mod tests;
 pub mod track;
 pub mod tune;
 pub mod validate;

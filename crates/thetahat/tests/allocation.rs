@@ -7,19 +7,11 @@ use thetahat::inspect::{InspectionPlan, inspect};
 use thetahat::model::Orders;
 use thetahat::optimize::{Algorithm, Search};
 use thetahat::track::{TrackMethod, TrackPlan, Tracker};
-
-/// A signal that looks random, and is the same everywhere.
-fn signal(length: usize, mut state: u32) -> Vec<f64> {
-    let mut next = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(state >> 8) / f64::from(1_u32 << 23) - 1.0
-    };
-    (0..length).map(|_| next()).collect()
-}
+use thetahat_numerics::noise::Noise;
 
 #[test]
 fn iterations_take_no_memory() {
-    let (u, e) = (signal(2000, 1), signal(2000, 2));
+    let (u, e) = (Noise(1).take(2000), Noise(2).take(2000));
     let mut y = vec![0.0; 2000];
     for t in 2..2000 {
         y[t] = 1.5 * y[t - 1] - 0.7 * y[t - 2] + u[t - 1] + e[t] + 0.6 * e[t - 1];
@@ -62,7 +54,7 @@ fn iterations_take_no_memory() {
 
 #[test]
 fn samples_of_a_tracker_take_no_memory() {
-    let (u, e) = (signal(2000, 3), signal(2000, 4));
+    let (u, e) = (Noise(3).take(2000), Noise(4).take(2000));
     for (nc, method, forgetting) in [
         (0, TrackMethod::Rls, "0.99"),
         (0, TrackMethod::Rls, "selective:0.99"),
@@ -99,7 +91,7 @@ fn an_inspection_takes_no_more_than_it_says_for_each_value() {
     // Values of which no two are the same take most: each is a level of its own.
     let rows = 200_000;
     let channel = |name: &str, seed, rows| {
-        let mut values = signal(rows, seed);
+        let mut values = Noise(seed).take(rows);
         values.iter_mut().enumerate().for_each(|(row, value)| *value += 1e-9 * row as f64);
         Channel { name: name.into(), values }
     };

@@ -43,7 +43,7 @@ fn assert_coverage(orders: &Orders, truth: &[f64], plant: [&[f64]; 2], noise: [&
     let (runs, samples) = (runs(40), 4000);
     let mut covered = vec![0_usize; truth.len()];
     for seed in 0..runs as u64 {
-        let mut random = Random(1 + seed);
+        let mut random = Random::new(1 + seed);
         let u = random.normals(BEFORE + samples);
         let e: Vec<f64> = random.normals(BEFORE + samples).iter().map(|e| size * e).collect();
         let (x, v) = (filtered(plant[0], plant[1], &u), filtered(noise[0], noise[1], &e));
@@ -121,7 +121,7 @@ fn assert_found(angles: &[f64]) {
     let numerator = [&[0.0], &b[..]].concat();
     let mut found = 0;
     for seed in 0..runs as u64 {
-        let mut random = Random(1000 + seed);
+        let mut random = Random::new(1000 + seed);
         let before = 1000;
         let u = random.normals(before + samples);
         let x = filtered(&numerator, &f, &u);
@@ -214,7 +214,7 @@ fn assert_chosen(truth: &Orders, noise: impl Fn(&mut Random, &[f64], &[f64]) -> 
     let (runs, samples) = (runs(25).min(100), 2000);
     let (mut chosen, mut worst) = (0, f64::NEG_INFINITY);
     for seed in 0..runs as u64 {
-        let mut random = Random(77_000 + seed);
+        let mut random = Random::new(77_000 + seed);
         let [b, f] = random_plant(&mut random);
         let u = random.normals(BEFORE + 2 * samples);
         let e = random.normals(u.len());

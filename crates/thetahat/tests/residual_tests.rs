@@ -99,7 +99,7 @@ fn residuals(report: &Report, log: &Log, rows: [usize; 2], seen: InSample) -> Re
 fn rates(kind: &Kind<'_>) -> [Rates; 2] {
     let mut rates = [Rates::default(), Rates::default()];
     for seed in 0..runs() as u64 {
-        let mut random = Random(1 + 7919 * seed);
+        let mut random = Random::new(1 + 7919 * seed);
         let u = filtered(&[1.0], kind.colour, &random.normals(BEFORE + 2 * ROWS));
         let e = random.normals(u.len());
         let (x, v) = (filtered(kind.plant[0], kind.plant[1], &u), filtered(kind.noise[0], kind.noise[1], &e));
@@ -230,7 +230,7 @@ fn feedback_is_seen_and_does_no_harm() {
     let orders = Orders::arx(2, &[2], &[1]).expect("the case is sound");
     let mut rates = Rates::default();
     for seed in 0..runs() as u64 {
-        let mut random = Random(5 + 7919 * seed);
+        let mut random = Random::new(5 + 7919 * seed);
         let (r, e) = (random.normals(BEFORE + ROWS), random.normals(BEFORE + ROWS));
         let (mut u, mut y) = (vec![0.0; 2], vec![0.0; 2]);
         for t in 2..r.len() {

@@ -7,7 +7,7 @@ use std::vec::Vec;
 use nalgebra::{Const, SVector, Vector4};
 
 use crate::arx::is_large;
-use crate::arx::tests::{Plant, inputs_at, stable_polynomial};
+use crate::arx::tests::{Plant, inputs_at, one, stable_polynomial};
 use crate::noise::Noise;
 use crate::stability::{is_stable, move_stably};
 use crate::{
@@ -20,10 +20,6 @@ const FORGETTING: Forgetting<f64> = Forgetting::Exponential { factor: 0.99 };
 
 fn debug<T: std::fmt::Debug>(value: &T) -> String {
     format!("{value:?}")
-}
-
-fn one(nb: usize, nk: usize) -> InputOrders {
-    InputOrders { nb, nk }
 }
 
 #[test]

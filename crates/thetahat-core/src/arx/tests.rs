@@ -18,7 +18,7 @@ fn debug<T: std::fmt::Debug>(value: &T) -> String {
     format!("{value:?}")
 }
 
-const fn one(nb: usize, nk: usize) -> InputOrders {
+pub(crate) const fn one(nb: usize, nk: usize) -> InputOrders {
     InputOrders { nb, nk }
 }
 

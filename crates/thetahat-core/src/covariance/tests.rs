@@ -4,19 +4,10 @@ use std::format;
 use nalgebra::{Const, Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use crate::noise::Noise;
-use crate::textbook::{Square, random, random_covariance};
+use crate::textbook::{Square, difference, random, random_covariance};
 use crate::{Covariance, Error, Real};
 
 type Of<const N: usize> = Covariance<f64, Const<N>>;
-
-/// The largest difference of two covariance matrices, beside the variances of the two elements.
-fn difference<const N: usize>(a: &Square<N>, b: &Square<N>) -> f64 {
-    let share = |i: usize, j: usize| {
-        let change = (a[(i, j)] - b[(i, j)]).abs();
-        if change == 0.0 { 0.0 } else { change / (b[(i, i)] * b[(j, j)]).sqrt() }
-    };
-    (0..N * N).map(|k| share(k / N, k % N)).fold(0.0, f64::max)
-}
 
 /// That the factors are those of a positive semidefinite matrix: D not negative, all finite.
 fn assert_legal<T: Real, const N: usize>(covariance: &Covariance<T, Const<N>>) {

@@ -11,18 +11,13 @@ fn innovation<T: Real>(error: T, variance: T) -> Innovation<T> {
     Innovation { error, variance, nis: error * error / variance, action: Action::Updated }
 }
 
-/// Some number that is nearly Gaussian: a sum of twelve, each with variance 1/12 of its own.
-fn gaussian(noise: &mut Noise) -> f64 {
-    (0..12).map(|_| noise.next() / 2.0).sum()
-}
-
 #[test]
 fn the_charts_are_their_equations() {
     let mut detector = ChangeDetector::new(f64::INFINITY, f64::INFINITY).unwrap();
     let (mut up, mut down, mut variance) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut noise = Noise(1);
     for _ in 0..1000 {
-        let (z, deviation) = (gaussian(&mut noise), 2.0 + noise.next());
+        let (z, deviation) = (noise.normal(), 2.0 + noise.next());
         assert_eq!(detector.update(&innovation(z * deviation, deviation * deviation)), None);
         up = (up + z - 0.5).max(0.0);
         down = (down - z - 0.5).max(0.0);
@@ -54,7 +49,7 @@ fn a_larger_variance_is_found_and_a_smaller_one_is_not() {
     let mut noise = Noise(2);
     let mut run = |deviation: f64| {
         let mut detector = ChangeDetector::new(f64::INFINITY, 8.0).unwrap();
-        (0..1000).find(|_| detector.update(&innovation(deviation * gaussian(&mut noise), 1.0)).is_some())
+        (0..1000).find(|_| detector.update(&innovation(deviation * noise.normal(), 1.0)).is_some())
     };
     assert!(run(2.0).is_some_and(|k| k < 40));
     assert_eq!(run(0.9), None);
@@ -78,7 +73,7 @@ fn of_a_filter_with_one_output_it_is_the_same_to_the_bit() {
         (ChangeDetector::new(4.0, 5.0).unwrap(), ChangeDetector::new(4.0, 5.0).unwrap());
     let (mut noise, mut alarms) = (Noise(6), 0);
     for k in 0..2000 {
-        let error = if k % 50 == 0 { f64::NAN } else { 1.5 * gaussian(&mut noise) };
+        let error = if k % 50 == 0 { f64::NAN } else { 1.5 * noise.normal() };
         let Innovation { variance, nis, action, .. } = innovation(error, 1.3);
         let vector = Innovation { error: Vector1::new(error), variance: Vector1::new(variance), nis, action };
         let alarm = one.update(&innovation(error, 1.3));
@@ -94,7 +89,7 @@ fn of_several_outputs_it_takes_the_normalised_square() {
     let mut detector = ChangeDetector::new(1.0, f64::INFINITY).unwrap();
     let (mut noise, mut g) = (Noise(7), 0.0_f64);
     for k in 0..1000 {
-        let z = Vector3::from_fn(|_, _| gaussian(&mut noise));
+        let z = Vector3::from_fn(|_, _| noise.normal());
         let measured = k % 4;
         let entry = |row: usize, value: f64| if row < measured { value } else { f64::NAN };
         let nis: f64 = (0..measured).map(|row| z[row] * z[row]).sum();

@@ -6,7 +6,7 @@ mod textbook;
 
 use nalgebra::{Const, SMatrix, SVector};
 
-use crate::textbook::Square;
+use crate::textbook::{Square, difference};
 use crate::{Covariance, KalmanFilter, LinearObservation, LinearTransition, Real};
 
 type Filter<const N: usize> = KalmanFilter<f64, Const<N>>;
@@ -32,13 +32,4 @@ fn observation<T: Real, const N: usize, const M: usize>(
 
 fn filter<T: Real, const N: usize>(x: &SVector<f64, N>, p: &Square<N>) -> KalmanFilter<T, Const<N>> {
     KalmanFilter::new(nalgebra::convert(*x), covariance(p)).unwrap()
-}
-
-/// The largest difference of two covariance matrices, beside the variances of the two elements.
-fn difference<const N: usize>(a: &Square<N>, b: &Square<N>) -> f64 {
-    let share = |i: usize, j: usize| {
-        let change = (a[(i, j)] - b[(i, j)]).abs();
-        if change == 0.0 { 0.0 } else { change / (b[(i, i)] * b[(j, j)]).sqrt() }
-    };
-    (0..N * N).map(|k| share(k / N, k % N)).fold(0.0, f64::max)
 }

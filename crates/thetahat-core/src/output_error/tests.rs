@@ -5,18 +5,13 @@ use std::vec::Vec;
 
 use nalgebra::{Const, SVector, Vector2};
 
-use crate::arx::tests::Plant;
+use crate::arx::tests::{Plant, one};
 use crate::noise::Noise;
 use crate::{
-    Action, ArxOrders, Error, Forgetting, InputOrders, OutputErrorMethod, Real, RecursiveArx,
-    RecursiveOutputError,
+    Action, ArxOrders, Error, Forgetting, OutputErrorMethod, Real, RecursiveArx, RecursiveOutputError,
 };
 
 const METHODS: [OutputErrorMethod; 2] = [OutputErrorMethod::PredictionError, OutputErrorMethod::Instruments];
-
-const fn one(nb: usize, nk: usize) -> InputOrders {
-    InputOrders { nb, nk }
-}
 
 const FIRST: ArxOrders<'_> = ArxOrders { na: 1, inputs: &[one(1, 1)], constant: false };
 
@@ -27,18 +22,13 @@ fn estimator<T: Real>(
     RecursiveOutputError::new(&FIRST, method, T::one(), &[T::one()], forgetting).unwrap()
 }
 
-/// Approximately normal, of variance 1.
-fn normal(noise: &mut Noise) -> f64 {
-    (0..12).map(|_| noise.next()).sum::<f64>() / 2.0
-}
-
 /// y and u of the plant of the table: x(k) = 0.9 x(k-1) + 0.08 u(k-1), sensor noise of half the deviation, with this
 /// pole.
 fn record(samples: usize, pole: f64, noise: &mut Noise) -> Vec<(f64, f64)> {
     let deviation = 0.5 * 0.08 / (1.0_f64 - 0.81).sqrt();
-    let (mut x, mut v) = (0.0, normal(noise));
+    let (mut x, mut v) = (0.0, noise.normal());
     let mut take = || {
-        v = pole * v + (1.0 - pole * pole).sqrt() * normal(noise);
+        v = pole * v + (1.0 - pole * pole).sqrt() * noise.normal();
         let (y, u) = (x + deviation * v, noise.next().signum());
         x = 0.9 * x + 0.08 * u;
         (y, u)

@@ -4,6 +4,9 @@
 //! The table is printed by `cargo test -p thetahat-core --test forgetting table -- --nocapture`.
 
 mod held;
+#[path = "../../src/noise.rs"]
+#[expect(dead_code, reason = "the unit tests take more of it")]
+mod noise;
 
 use std::fmt::Write;
 
@@ -12,23 +15,19 @@ use thetahat_core::{Forgetting, Real, RecursiveLeastSquares};
 
 const RUNS: u64 = 200;
 
-/// SplitMix64 (Steele, Lea and Flood 2014), and normal numbers of it by twos (Box and Muller 1958).
+/// Normal numbers by twos (Box and Muller 1958).
 struct Noise {
-    state: u64,
+    uniform: noise::Noise,
     spare: Option<f64>,
 }
 
 impl Noise {
     fn new(seed: u64) -> Self {
-        Noise { state: seed, spare: None }
+        Noise { uniform: noise::Noise(seed), spare: None }
     }
 
     fn bits(&mut self) -> u64 {
-        self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.state;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits ^ (bits >> 31)
+        self.uniform.bits()
     }
 
     /// Above 0, at most 1.

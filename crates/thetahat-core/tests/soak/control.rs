@@ -78,7 +78,7 @@ const BACK: [u64; 7] = [300, 1950, 20_300, 33_500, 34_900, 40_800, 50_300];
 #[test]
 fn self_tuner() {
     let mut noise = Noise(7);
-    let mut normal = move || (0..12).map(|_| f64::from(0.5 * noise.next())).sum::<f64>();
+    let mut normal = move || (0..12).map(|_| f64::from(0.5 * noise.single())).sum::<f64>();
     let response = ResponseWanted { frequency: 0.3, damping: 0.8, observer: 0.3 };
     // Wide enough that a plant which has begun to integrate is learnt before it leaves it.
     let sensor = Sensor { range: -20.0..=20.0, stuck_after: 4, ..Sensor::default() };

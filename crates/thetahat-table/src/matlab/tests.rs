@@ -5,6 +5,7 @@ use flate2::write::ZlibEncoder;
 
 use super::super::{Reader, Selection, Table};
 use super::*;
+use crate::tests::dice::Dice;
 
 /// An element, filled up to a multiple of eight bytes; short ones within their tag.
 fn element(kind: u32, data: &[u8]) -> Vec<u8> {
@@ -149,19 +150,13 @@ fn damaged_files_do_no_harm() {
             assert!(table.rows >= 3, "{end}");
         }
     }
-    let mut state = 2_463_534_242_u64;
-    let mut below = |limit: usize| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 33) as usize % limit
-    };
+    let mut dice = Dice(2_463_534_242);
     let mut read = 0;
     for _ in 0..1000 {
         let mut content = content.clone();
-        for _ in 0..1 + below(3) {
-            let at = HEAD + below(content.len() - HEAD);
-            content[at] = [below(256) as u8, 0, 0xff][below(3)];
+        for _ in 0..1 + dice.below(3) {
+            let at = HEAD + dice.below(content.len() - HEAD);
+            content[at] = [dice.below(256) as u8, 0, 0xff][dice.below(3)];
         }
         match whole(&content) {
             Ok(_) => read += 1,

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::tests::dice::Dice;
 use crate::{Error, Options, Reader, Selection, Table};
 
 fn data(name: &str) -> PathBuf {
@@ -57,17 +58,15 @@ fn damaged_files_are_refused_and_nothing_panics() {
     }
     for name in ["log.xlsx"] {
         let whole = std::fs::read(data(name)).unwrap();
-        let mut dice = 7_u64;
+        let mut dice = Dice(7);
         for round in 0..240 {
             let mut bytes = whole.clone();
             if round % 3 == 0 {
                 bytes.truncate(8 + whole.len() * round / 240);
             } else {
                 for _ in 0..1 + round / 16 {
-                    dice =
-                        dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                    let place = 8 + (dice >> 33) as usize % (bytes.len() - 8);
-                    bytes[place] ^= (dice >> 24) as u8;
+                    let place = 8 + dice.below(bytes.len() - 8);
+                    bytes[place] ^= dice.below(256) as u8;
                 }
             }
             std::fs::write(&path, &bytes).unwrap();

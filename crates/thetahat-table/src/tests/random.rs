@@ -1,22 +1,7 @@
 //! Random logs: nothing makes the reader panic, and nothing depends on where the text is cut.
 
+use super::dice::Dice;
 use super::*;
-
-/// A deterministic stream of numbers (xorshift).
-struct Dice(u64);
-
-impl Dice {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 33) as usize % limit
-    }
-
-    fn pick<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[self.below(choices.len())]
-    }
-}
 
 /// Everything in a table that can be compared.
 fn contents(table: &Table) -> impl PartialEq + std::fmt::Debug + use<> {

@@ -2,6 +2,7 @@ use thetahat_core::nalgebra::Complex;
 
 use super::*;
 use crate::model::{Model, Orders, PolynomialModel};
+use crate::tests::near;
 use crate::{Document, Error};
 
 /// A model of these parameters, with this covariance.
@@ -24,11 +25,6 @@ fn motor(covariance: Option<f64>) -> Result<Model, Error> {
 fn wanted() -> Vec<Complex<f64>> {
     let pole = Complex::from_polar((-0.35_f64).exp(), 0.5 * (1.0 - 0.49_f64).sqrt());
     vec![pole, pole.conj()]
-}
-
-fn near(found: &[f64], expected: &[f64], tolerance: f64) -> bool {
-    found.len() == expected.len()
-        && found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < tolerance)
 }
 
 /// The published controllers of the motor (figures of an independent program).

@@ -70,13 +70,12 @@ fn write(hasher: &mut XxHash3_128, values: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Channel;
+    use crate::tests::channel;
 
     #[test]
     fn a_digest_is_that_of_the_rows_whatever_stands_around_them() -> Result<(), Error> {
         let log = |y: Vec<f64>| {
             let u = vec![1.0; y.len()];
-            let channel = |name: &str, values| Channel { name: name.into(), values };
             Log::new(vec![channel("u", u), channel("y", y)], 1.0)
         };
         let rows = ["2..3".parse()?];

@@ -2,14 +2,11 @@
 
 use thetahat_numerics::noise::Noise;
 
-use super::{Channel, Detrend, Interpolation, Log, Offset, Resample, Rows};
+use super::{Detrend, Interpolation, Log, Offset, Resample, Rows};
 use crate::Error;
+use crate::tests::channel;
 
 const NAN: f64 = f64::NAN;
-
-fn channel(name: &str, values: &[f64]) -> Channel {
-    Channel { name: name.to_owned(), values: values.to_vec() }
-}
 
 fn rows(text: &str) -> Rows {
     text.parse().unwrap()

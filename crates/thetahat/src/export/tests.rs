@@ -10,23 +10,8 @@ mod states;
 use super::program::Program;
 use super::vector::Vector;
 use super::*;
-use crate::data::{Channel, Log};
-
-/// Numbers that look random, in -1 … 1.
-pub(super) fn signal(seed: u32, rows: usize) -> Vec<f64> {
-    let mut random = seed;
-    let mut next = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 8) / f64::from(1 << 23) - 1.0
-    };
-    (0..rows).map(|_| next()).collect()
-}
-
-pub(super) fn log(channels: &[(&str, Vec<f64>)], sample_time: f64) -> Log {
-    let channel =
-        |(name, values): &(&str, Vec<f64>)| Channel { name: (*name).into(), values: values.clone() };
-    Log::new(channels.iter().map(channel).collect(), sample_time).expect("a log")
-}
+use crate::data::Log;
+pub(super) use crate::tests::{congruential as signal, log};
 
 /// What a program says along a log in double precision.
 pub(super) fn said(program: &Program, model: &Model, log: &Log) -> Vec<Vec<f64>> {

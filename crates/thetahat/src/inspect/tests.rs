@@ -7,7 +7,8 @@ use thetahat_numerics::regression::{Presample, Taps, sum_of_squares};
 use super::clock::Ticks;
 use super::*;
 use crate::Error;
-use crate::data::{Channel, Interpolation, Log, Recording, Resample, Source, Times};
+use crate::data::{Interpolation, Log, Recording, Resample, Source, Times};
+use crate::tests::channel;
 use crate::validate::feedback::feedback;
 
 mod channels;
@@ -67,12 +68,11 @@ fn deviations(signal: &[f64]) -> Vec<f64> {
 }
 
 fn quality(values: Vec<f64>) -> ChannelQuality {
-    channel::quality(&Channel { name: "x".into(), values }, None, &Times::Uniform(1.0)).0
+    channel::quality(&channel("x", values), None, &Times::Uniform(1.0)).0
 }
 
 fn recording(channels: &[(&str, &[f64])], times: Times) -> Recording {
-    let channel = |(name, values): &(&str, &[f64])| Channel { name: (*name).into(), values: values.to_vec() };
-    Recording { channels: channels.iter().map(channel).collect(), times }
+    Recording { channels: channels.iter().map(|(name, values)| channel(name, values)).collect(), times }
 }
 
 fn source() -> Source {

@@ -172,24 +172,22 @@ fn unknown_gains(linear: &[LinearModel<'_>]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use thetahat_numerics::noise::Noise;
+
     use super::*;
-    use crate::data::{Channel, Log};
+    use crate::data::Log;
     use crate::model::{Interval, Model, Orders};
     use crate::report::{Plan, identify};
+    use crate::tests::channel;
 
     /// y(t) = 0.9 y(t-1) + b u(t-1) + e(t).
     fn report(b: f64, inputs: &[&str]) -> Report {
-        let (mut u, mut y, mut random) = (vec![], vec![0.0], 1_u32);
-        let mut draw = || {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(random >> 8) / f64::from(1 << 23) - 1.0
-        };
+        let (mut u, mut y, mut noise) = (vec![], vec![0.0], Noise(1));
         for t in 0..600 {
-            u.push(draw());
-            y.push(0.9 * y[t] + b * u[t] + 0.1 * draw());
+            u.push(noise.uniform());
+            y.push(0.9 * y[t] + b * u[t] + 0.1 * noise.uniform());
         }
         y.pop();
-        let channel = |name: &str, values| Channel { name: name.into(), values };
         let log = Log::new(vec![channel("u", u), channel("y", y)], 0.5).unwrap();
         let one = vec![1; inputs.len()];
         identify(log, &[], &Plan::new(inputs, "y", Orders::arx(1, &one, &one).unwrap())).unwrap()

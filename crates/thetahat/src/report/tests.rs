@@ -3,10 +3,11 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::{Channel, Log, Rows};
+use crate::data::{Log, Rows};
 use crate::estimate::{Initial, Procedure};
 use crate::model::{Model, Orders};
 use crate::respond::{Horizon, InitialCondition};
+use crate::tests::channel;
 use crate::validate::Part;
 
 impl Report {
@@ -22,7 +23,6 @@ impl Report {
 }
 
 fn log(u: &[f64], y: &[f64]) -> Log {
-    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
     Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
 }
 
@@ -59,7 +59,7 @@ fn is_consistent(report: &Report, log: &Log) {
 
 /// y(t) = 0.9 y(t-1) + u(t-1) with white noise around it, u held for some samples.
 fn first_order(samples: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
-    let u: Vec<f64> = (0..samples).map(|_| noise.normal()).collect();
+    let u: Vec<f64> = noise.take_normal(samples);
     let mut x = vec![3.0];
     (1..samples).for_each(|t| x.push(0.95 * x[t - 1] + u[t - 1]));
     let y = x.iter().map(|x| x + noise.normal()).collect();

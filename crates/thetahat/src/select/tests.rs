@@ -17,17 +17,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::Initial;
 use crate::model::{Orders, Structure};
-
-/// numerator/denominator applied to a signal from rest.
-fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
-    let mut response: Vec<f64> = Vec::with_capacity(signal.len());
-    for t in 0..signal.len() {
-        let driven: f64 = (0..numerator.len().min(t + 1)).map(|i| numerator[i] * signal[t - i]).sum();
-        let past: f64 = (1..denominator.len().min(t + 1)).map(|i| denominator[i] * response[t - i]).sum();
-        response.push(driven - past);
-    }
-    response
-}
+use crate::tests::filtered;
 
 fn sum(a: &[f64], b: &[f64], weight: f64) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + weight * b).collect()
@@ -37,8 +27,35 @@ fn range(first: usize, last: usize) -> OrderRange {
     OrderRange::new(first, last).unwrap()
 }
 
+/// Of ARX models.
+fn arx_grid(na: OrderRange, nb: &[OrderRange], nk: &[OrderRange]) -> Grid {
+    let nf = vec![0.into(); nb.len().min(1)];
+    Grid { na, nb: nb.to_vec(), nk: nk.to_vec(), nc: 0.into(), nd: 0.into(), nf, path: Path::All }
+}
+
 fn record<'a>(y: &'a [f64], u: &[&'a [f64]], segments: &[Range<usize>]) -> Record<'a> {
     Record { output: y, inputs: u.to_vec(), segments: segments.to_vec(), past: vec![0; segments.len()] }
+}
+
+/// A choice by MDL, for whatever the model is good for.
+fn task<'a>(record: &'a Record<'a>, inputs: &'a [String], search: &'a Search) -> Task<'a> {
+    Task {
+        estimation: record,
+        validation: None,
+        inputs,
+        select: Select::MDL,
+        focus: Focus::Auto,
+        initial: Initial::Auto,
+        may_drift: true,
+        search,
+        deadline: Deadline::default(),
+        monitor: &|_| ControlFlow::Continue(()),
+    }
+}
+
+/// The names of the inputs.
+fn names(record: &Record<'_>) -> Vec<String> {
+    (1..=record.inputs.len()).map(|number| format!("u{number}")).collect()
 }
 
 /// A choice with settings.
@@ -49,41 +66,14 @@ fn chosen(
     select: Select,
     initial: Initial,
 ) -> Result<SelectedModel, Error> {
-    let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
-    let search = Search::default();
-    let task = Task {
-        estimation: record,
-        validation,
-        inputs: &inputs,
-        select,
-        focus: Focus::Auto,
-        initial,
-        may_drift: true,
-        search: &search,
-        deadline: Deadline::default(),
-        monitor: &|_| ControlFlow::Continue(()),
-    };
-    choose(&task, choice)
+    let (inputs, search) = (names(record), Search::default());
+    choose(&Task { validation, select, initial, ..task(record, &inputs, &search) }, choice)
 }
 
-/// A choice by MDL for some purpose.
-/// Without a look for drifts.
+/// A choice by MDL for some purpose, without a look for drifts.
 fn focused(record: &Record<'_>, choice: &Choice, focus: Focus) -> Result<SelectedModel, Error> {
-    let inputs: Vec<String> = (1..=record.inputs.len()).map(|number| format!("u{number}")).collect();
-    let search = Search::default();
-    let task = Task {
-        estimation: record,
-        validation: None,
-        inputs: &inputs,
-        select: Select::MDL,
-        focus,
-        initial: Initial::Auto,
-        may_drift: false,
-        search: &search,
-        deadline: Deadline::default(),
-        monitor: &|_| ControlFlow::Continue(()),
-    };
-    choose(&task, choice)
+    let (inputs, search) = (names(record), Search::default());
+    choose(&Task { focus, may_drift: false, ..task(record, &inputs, &search) }, choice)
 }
 
 fn close(a: f64, b: f64, relative: f64) -> bool {

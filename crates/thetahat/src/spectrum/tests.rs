@@ -4,8 +4,9 @@ use thetahat_core::nalgebra::Complex;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::{Channel, Log};
+use crate::data::Log;
 use crate::respond::FrequencyPoint;
+use crate::tests::assert_refused;
 use crate::{Document, Error};
 
 mod coverage;
@@ -13,14 +14,12 @@ mod refusals;
 
 /// White noise of variance 1.
 fn noise(seed: u64, count: usize) -> Vec<f64> {
-    let mut noise = Noise(seed << 32);
-    (0..count).map(|_| noise.normal()).collect()
+    Noise(seed << 32).take_normal(count)
 }
 
 /// A log with a sample time of half a second.
 fn log(channels: &[(&str, &[f64])]) -> Log {
-    let channel = |(name, values): &(&str, &[f64])| Channel { name: (*name).into(), values: values.to_vec() };
-    Log::new(channels.iter().map(channel).collect(), 0.5).unwrap()
+    crate::tests::log(channels, 0.5)
 }
 
 /// (b0 + b1 q^-1)/(1 + a1 q^-1 + a2 q^-2) from rest.
@@ -256,8 +255,10 @@ fn each_input_has_its_own_sines() {
     assert_eq!((of("a").len(), of("b").len(), found.noise.len()), (1, 1, 2));
     assert!((of("a")[0].re - 2.0).abs() < 1e-12 && (of("b")[0].re + 0.5).abs() < 1e-12);
     let both: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a + b).collect();
-    let error = spectrum(&log(&[("a", &a), ("b", &both), ("y", &y)]), &[], &plan).unwrap_err();
-    assert!(error.to_string().contains("the inputs 'a' and 'b' both have power"), "{error}");
+    assert_refused(
+        spectrum(&log(&[("a", &a), ("b", &both), ("y", &y)]), &[], &plan),
+        "the inputs 'a' and 'b' both have power",
+    );
 }
 
 #[test]

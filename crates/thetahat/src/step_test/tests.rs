@@ -6,11 +6,11 @@ mod spread;
 use thetahat_numerics::random::Random;
 
 use super::{StepFigure, StepMethod, StepTest, StepTestPlan, step_test};
-use crate::data::{Channel, Log};
+use crate::data::Log;
+use crate::tests::channel;
 
 /// A log with a column of times.
 fn timed(time: &[f64], u: Vec<f64>, y: Vec<f64>) -> Log {
-    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
     Log::recorded(vec![channel("u", u), channel("y", y)], time.to_vec()).unwrap()
 }
 
@@ -63,8 +63,10 @@ fn the_process_of_least_squares_has_the_shape_of_the_responses() {
     let u = |t: f64| if (40.0..160.0).contains(&t) { 2.0 } else { 0.0 };
     let found = |y: &dyn Fn(f64) -> f64| {
         let time = || (0..560).map(|k| 0.5 * f64::from(k));
-        let channel = |name: &str, values| Channel { name: name.into(), values };
-        let channels = vec![channel("u", time().map(u).collect()), channel("y", time().map(y).collect())];
+        let channels = vec![
+            channel("u", time().map(u).collect::<Vec<_>>()),
+            channel("y", time().map(y).collect::<Vec<_>>()),
+        ];
         let log = Log::new(channels, 0.5).unwrap();
         step_test(&log, &[], &StepTestPlan::new("u", "y")).unwrap()
     };

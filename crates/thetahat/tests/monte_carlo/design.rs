@@ -45,7 +45,7 @@ fn estimated(orders: &Orders, y: &[f64], u: &[f64]) -> (Vec<f64>, PolynomialMode
 fn assert_planned(orders: &Orders, truth: [&[f64]; 5], waveform: &str, length: usize) {
     let [a, b, c, d, f] = truth;
     // The truth is a model that was fitted: any will do.
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let u = random.normals(BEFORE + 4000);
     let e = random.normals(u.len());
     let (x, v) = (filtered(b, f, &u), filtered(c, d, &e));
@@ -71,7 +71,7 @@ fn assert_planned(orders: &Orders, truth: [&[f64]; 5], waveform: &str, length: u
     let runs = runs(60);
     let mut errors_found = vec![Vec::with_capacity(runs); figures.len()];
     for seed in 0..runs as u64 {
-        let y = output(&model, &driven, &mut Random(100 + seed));
+        let y = output(&model, &driven, &mut Random::new(100 + seed));
         let y: Vec<f64> = y[BEFORE..].iter().map(|y| y + 3.0).collect();
         let (parameters, found) = estimated(orders, &y, &inputs[0]);
         let values = parameters.into_iter().chain([gain(&found).value]);

@@ -47,7 +47,7 @@ measurement = { y1 = 0.02, y2 = 0.03 }
 /// A log of it, with the noises that it tells of times `noise`.
 fn log(seed: u64, noise: f64) -> Log {
     let [damping, stiffness, gain, square, drive] = TRUTH;
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut normal = |deviation: f64| deviation * noise * random.normal();
     let (mut angle, mut rate) = (0.2 + normal(0.3), -0.1 + normal(0.2));
     let mut channels = ["u", "y1", "y2"].map(|name| Channel { name: name.into(), values: Vec::new() });

@@ -72,7 +72,7 @@ fn held(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2] {
     const STEPS: [usize; 3] = [1, 5, 20];
     let (mut held, mut counts) = ([[0_usize; 3]; 2], [[0_usize; 3]; 2]);
     for seed in 0..runs as u64 {
-        let mut random = Random(11 + 7919 * seed);
+        let mut random = Random::new(11 + 7919 * seed);
         let before = 3000;
         let (u, e) = (random.normals(before + 2 * samples), random.normals(before + 2 * samples));
         let (x, v) =
@@ -131,7 +131,7 @@ fn held_around_a_level(case: &Case, samples: usize, runs: usize) -> [[f64; 3]; 2
     const STEPS: [usize; 3] = [1, 5, 20];
     let (mut held, mut counts) = ([[0_usize; 3]; 2], [[0_usize; 3]; 2]);
     for seed in 0..runs as u64 {
-        let mut random = Random(11 + 7919 * seed);
+        let mut random = Random::new(11 + 7919 * seed);
         let before = 3000;
         let (u, e) = (random.normals(before + 2 * samples), random.normals(before + 2 * samples));
         let (x, v) =
@@ -212,7 +212,7 @@ fn intervals_of_gains_hold_near_an_integrator() {
         let orders = orders.expect("the case is sound");
         let (mut gains, mut times) = (0, 0);
         for seed in 0..runs as u64 {
-            let mut random = Random(5 + 7919 * seed);
+            let mut random = Random::new(5 + 7919 * seed);
             let (u, e) = (random.normals(before + samples), random.normals(before + samples));
             let (x, v) = (filtered(&[0.0, 0.5], &pole, &u), filtered(&noise[0], &noise[1], &e));
             let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| 3.0 + x + v).skip(before).collect();
@@ -246,7 +246,7 @@ fn intervals_of_output_error_hold_in_short_logs() {
     ] {
         let mut held = [0_usize; 4];
         for seed in 0..runs as u64 {
-            let mut random = Random(1 + 7919 * seed);
+            let mut random = Random::new(1 + 7919 * seed);
             let before = 300;
             let u = random.normals(samples);
             let e: Vec<f64> = random.normals(before + samples).iter().map(|e| size * e).collect();
@@ -279,7 +279,7 @@ fn standard_errors_are_right_with_missing_outputs() {
     for (name, noise) in all {
         let (mut values, mut errors) = (vec![Vec::new(); 2], vec![0.0; 2]);
         for seed in 0..runs as u64 {
-            let mut random = Random(3 + 7919 * seed);
+            let mut random = Random::new(3 + 7919 * seed);
             let u = random.normals(samples);
             let (x, e) = (filtered(&[0.0, 0.5], &[1.0, -0.8], &u), random.normals(before + samples));
             let v = filtered(&[0.2], &noise, &e);

@@ -20,7 +20,7 @@ fn held(pole: f64, steps: &[f64], runs: usize) -> [[f64; 3]; 2] {
     let [gain, tau, theta] = TRUTH;
     let mut counts = [[0_usize; 3]; 2];
     for seed in 0..runs as u64 {
-        let mut random = Random(3 + 104_729 * seed);
+        let mut random = Random::new(3 + 104_729 * seed);
         let e = random.normals(700);
         let size = 0.05 * (1.0 - pole * pole).sqrt();
         let mut v = 0.0;
@@ -103,7 +103,7 @@ fn held_of_transfer_function(seconds: f64, rows: usize, runs: usize) -> [f64; 6]
     let sampled = continuous.sampled(seconds, Hold::Zero).expect("the case is sound");
     let mut counts = [0_usize; 6];
     for seed in 0..runs as u64 {
-        let mut random = Random(3 + 104_729 * seed);
+        let mut random = Random::new(3 + 104_729 * seed);
         let signs = random.normals(rows.div_ceil(7));
         let u: Vec<f64> = (0..rows).map(|row| signs[row / 7].signum()).collect();
         let mut state = DVector::zeros(4);

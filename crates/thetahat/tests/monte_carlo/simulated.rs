@@ -2,17 +2,19 @@
 
 use std::f64::consts::TAU;
 
-/// SplitMix64 (Steele, Lea and Flood 2014) and the polar form of Box and Muller.
-pub(crate) struct Random(pub(crate) u64);
+use thetahat_numerics::noise::Noise;
+
+/// Numbers of which none is 0, and the polar form of Box and Muller.
+pub(crate) struct Random(Noise);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(Noise(seed))
+    }
+
+    /// Uniform in 0 … 1, in the middle of steps of 2^-53.
     pub(crate) fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        bits ^= bits >> 31;
-        ((bits >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        0.5 * (1.0 + self.0.uniform()) + 0.25 * f64::EPSILON
     }
 
     pub(crate) fn normal(&mut self) -> f64 {

@@ -31,7 +31,7 @@ fn median_error(weighting: Weighting) -> f64 {
     let norm = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
     let options = SubspaceOptions { weighting, feedthrough: Some(false), ..SubspaceOptions::default() };
     let error = |seed: u64| {
-        let mut random = Random(1 + seed);
+        let mut random = Random::new(1 + seed);
         let (mut u, mut y, mut x) = (Vec::new(), Vec::new(), [0.0, 0.0]);
         for _ in 0..1000 {
             let (e, r) = (random.normal(), random.normal());
@@ -87,7 +87,7 @@ fn seen(x: &[f64; 4], u: &[f64; 2]) -> [f64; 2] {
 
 /// N = 800 samples, with inputs and innovations of variance 1 and 0.25, from a state that is not at rest.
 fn log(seed: u64) -> Log {
-    let mut random = Random(1 + seed);
+    let mut random = Random::new(1 + seed);
     let (mut channels, mut x) = ([const { Vec::new() }; 4], [0.0; 4]);
     for t in 0..900 {
         let [u, e] = [1.0, 0.5].map(|size| [size * random.normal(), size * random.normal()]);

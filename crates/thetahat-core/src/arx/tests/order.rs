@@ -207,8 +207,7 @@ fn control(seed: u64, c: f64, mut controller: impl FnMut(f64, f64, f64) -> f64) 
     let (mut noise, mut y, mut u, mut before) = (Noise(seed), 0.0, 0.0, 0.0);
     let (mut sum, mut count) = (0.0, 0);
     for k in 0..2000 {
-        // Twelve uniform numbers of variance 1/3 are nearly Gaussian.
-        let e = NOISE * (0..12).map(|_| noise.next()).sum::<f64>() / 2.0;
+        let e = NOISE * noise.normal();
         y = 0.9 * y + 0.08 * u + e + c * before;
         before = e;
         // What a step of the set point asks for arrives one sample later.

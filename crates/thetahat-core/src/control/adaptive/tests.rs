@@ -14,7 +14,6 @@ use std::vec::Vec;
 use nalgebra::Const;
 
 use super::{IndirectSelfTuner, ResponseWanted, TunerOrders, TunerSettings};
-use crate::noise::Noise;
 use crate::{Error, Forgetting};
 
 /// A plant of second order with its noise, stepped in double precision.
@@ -50,11 +49,6 @@ impl Simulated {
         self.b.clone_from(&other.b);
         self.inputs.resize(other.b.len(), 0.0);
     }
-}
-
-/// About normal, variance 1.
-fn normal(noise: &mut Noise) -> f64 {
-    (0..12).map(|_| 0.5 * noise.next()).sum()
 }
 
 /// A plant of second order with up to three samples of dead time.

@@ -1,6 +1,7 @@
 //! Whatever the bytes are, there is a table or an error, in little time and memory.
 
 use super::*;
+use crate::tests::dice::Dice;
 
 fn logs() -> [Vec<u8>; 3] {
     [ulog::flight(), dataflash::flight(), wpilog::flight()]
@@ -36,26 +37,20 @@ fn a_log_that_is_cut_anywhere_is_read_up_to_there() {
 
 #[test]
 fn damaged_logs_do_no_harm() {
-    let mut state = 88_172_645_463_325_252_u64;
-    let mut below = |limit: usize| {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        (state >> 33) as usize % limit
-    };
+    let mut dice = Dice(88_172_645_463_325_252);
     let (mut read, mut refused) = (0, 0);
     for log in logs() {
         for _ in 0..3000 {
             let mut bytes = log.clone();
-            for _ in 0..1 + below(4) {
-                let at = below(bytes.len());
-                match below(4) {
-                    0 => bytes[at] = below(256) as u8,
-                    1 => bytes[at] ^= 1 << below(8),
+            for _ in 0..1 + dice.below(4) {
+                let at = dice.below(bytes.len());
+                match dice.below(4) {
+                    0 => bytes[at] = dice.below(256) as u8,
+                    1 => bytes[at] ^= 1 << dice.below(8),
                     2 => drop(bytes.remove(at)),
                     _ => {
-                        let end = bytes.len().min(at + below(40));
-                        bytes[at..end].fill([0, 0xff][below(2)]);
+                        let end = bytes.len().min(at + dice.below(40));
+                        bytes[at..end].fill([0, 0xff][dice.below(2)]);
                     }
                 }
             }

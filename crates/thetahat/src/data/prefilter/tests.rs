@@ -1,7 +1,7 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::Channel;
+use crate::tests::channel;
 
 const STEP: f64 = 0.01;
 
@@ -50,7 +50,6 @@ fn bands_are_read_and_refused() {
 }
 
 fn log(u: Vec<f64>, y: Vec<f64>) -> Log {
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     Log::new(vec![channel("u", u), channel("y", y)], STEP).unwrap()
 }
 

@@ -175,6 +175,7 @@ impl Log {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::assert_refused;
 
     fn part(name: &str, time: Vec<f64>, values: Vec<f64>) -> Recording {
         let channels = vec![Channel { name: name.into(), values }];
@@ -272,8 +273,7 @@ mod tests {
             (vec![one(), one()], "a"),
             (vec![], "there is none"),
         ] {
-            let error = Log::on_one_clock(parts, None).unwrap_err().to_string();
-            assert!(error.contains(words), "{error}");
+            assert_refused(Log::on_one_clock(parts, None), words);
         }
     }
 }

@@ -3,16 +3,13 @@ use std::f64::consts::TAU;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
+use crate::tests::channel;
 
 const RECORDED: f64 = 1e-3;
 const STEP: f64 = 0.01;
 
 fn times(count: u32) -> Vec<f64> {
     (0..count).map(|k| f64::from(k) * RECORDED).collect()
-}
-
-fn channel(name: &str, values: Vec<f64>) -> Channel {
-    Channel { name: name.into(), values }
 }
 
 /// The values of one channel every `STEP`.

@@ -7,9 +7,10 @@ use thetahat_numerics::noise::Noise;
 use thetahat_numerics::optimize::Algorithm;
 
 use super::*;
-use crate::data::{Channel, Detrend, Log};
+use crate::data::{Detrend, Log};
 use crate::estimate::{Constant, Method};
 use crate::report::{Plan, identify};
+use crate::tests::{channel, filtered};
 
 /// An ARMA model of a log as statsmodels has it.
 struct Case {
@@ -137,7 +138,7 @@ fn public(name: &str, holes: bool) -> Log {
     if holes {
         (0..y.len()).filter(|t| 7 * t * t * t % 23 < 7).for_each(|t| y[t] = f64::NAN);
     }
-    Log::new(vec![Channel { name: "y".to_owned(), values: y }], 1.0).unwrap()
+    Log::new(vec![channel("y", y)], 1.0).unwrap()
 }
 
 /// Newton's method, as the information is not the Hessian where the model is not true.
@@ -231,17 +232,6 @@ impl Experiment {
 
 fn orders() -> Orders {
     Orders::armax(2, &[2], 1, &[1]).unwrap()
-}
-
-/// numerator/denominator from rest.
-fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
-    let mut response: Vec<f64> = Vec::new();
-    for t in 0..signal.len() {
-        let driven: f64 = (0..numerator.len().min(t + 1)).map(|i| numerator[i] * signal[t - i]).sum();
-        let past: f64 = (1..denominator.len().min(t + 1)).map(|i| denominator[i] * response[t - i]).sum();
-        response.push(driven - past);
-    }
-    response
 }
 
 fn impulse(length: usize) -> Vec<f64> {
@@ -470,7 +460,7 @@ fn the_report_is_that_of_its_log_and_criteria_decide_about_a_level() {
     let mut y = filtered(&[1.0, 0.4], &[1.0, -0.7], &noise.take(400));
     y.iter_mut().for_each(|y| *y += 30.0);
     (0..400).filter(|t| t % 9 == 4).for_each(|t| y[t] = f64::NAN);
-    let log = Log::new(vec![Channel { name: "y".to_owned(), values: y }], 1.0).unwrap();
+    let log = Log::new(vec![channel("y", y)], 1.0).unwrap();
     let method = Method::ExactLikelihood(Search::default());
     let plan = Plan { method, ..Plan::new(&[], "y", Orders::armax(1, &[], 1, &[]).unwrap()) };
     let report = identify(log.clone(), &[], &plan).unwrap();

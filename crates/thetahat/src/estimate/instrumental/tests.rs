@@ -2,21 +2,11 @@
 
 use thetahat_numerics::noise::Noise;
 use thetahat_numerics::optimize::Search;
-use thetahat_numerics::regression::add_filtered;
 
 use super::*;
 use crate::estimate::{Method, estimate};
 use crate::model::polynomial::product;
-
-/// (numerator/denominator) signal from rest.
-fn response(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
-    let whole = 0..signal.len();
-    let mut driven = vec![0.0; signal.len()];
-    add_filtered(&mut driven, &whole, numerator, signal, 0);
-    let mut x = Vec::new();
-    divided(&mut x, &driven, denominator, std::slice::from_ref(&whole));
-    x
-}
+use crate::tests::filtered;
 
 /// y = (B/F) u + v, v being noise of standard deviation `size` coloured by 1/D; the first 500 samples are not in the
 /// record.
@@ -34,8 +24,8 @@ const PLANT: [f64; 4] = [-1.5, 0.7, 1.0, 0.5];
 impl Experiment {
     fn new(length: usize, size: f64, noise: &mut Noise) -> Self {
         let u = noise.take(length + 500);
-        let v = response(&[size], &D, &noise.take(length + 500));
-        let y = response(&B, &F, &u).iter().zip(&v).map(|(x, v)| x + v).collect();
+        let v = filtered(&[size], &D, &noise.take(length + 500));
+        let y = filtered(&B, &F, &u).iter().zip(&v).map(|(x, v)| x + v).collect();
         Self { u, y }
     }
 
@@ -146,9 +136,9 @@ fn refined_instrumental_variables_end_where_the_output_error_is_least() {
 fn several_inputs_have_denominators_of_their_own() {
     let mut noise = Noise(4);
     let inputs: Vec<Vec<f64>> = (0..2).map(|_| noise.take(3000)).collect();
-    let first = response(&[0.0, 1.0], &[1.0, -0.9], &inputs[0]);
-    let second = response(&[0.0, 0.0, 2.0, 1.0], &[1.0, -1.0, 0.5], &inputs[1]);
-    let v = response(&[0.3], &[1.0, -0.8], &noise.take(3000));
+    let first = filtered(&[0.0, 1.0], &[1.0, -0.9], &inputs[0]);
+    let second = filtered(&[0.0, 0.0, 2.0, 1.0], &[1.0, -1.0, 0.5], &inputs[1]);
+    let v = filtered(&[0.3], &[1.0, -0.8], &noise.take(3000));
     let y: Vec<f64> = (0..3000).map(|t| first[t] + second[t] + v[t]).collect();
     let record = Record::new(&y, inputs.iter().map(Vec::as_slice).collect()).unwrap();
     let orders = Orders::oe(&[1, 2], &[1, 2], &[1, 2]).unwrap();
@@ -173,7 +163,7 @@ fn several_inputs_have_denominators_of_their_own() {
 fn the_start_is_estimated_where_it_is_worth_it() {
     let mut noise = Noise(5);
     let u = noise.take(1500);
-    let x = response(&[0.0, 0.02], &[1.0, -1.98, 0.9801], &u);
+    let x = filtered(&[0.0, 0.02], &[1.0, -1.98, 0.9801], &u);
     let y: Vec<f64> = x.iter().map(|x| x + 0.05 * noise.uniform()).collect();
     let orders = Orders::oe(&[1], &[2], &[1]).unwrap();
     let fit = |from: usize| {

@@ -1,7 +1,8 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::{Channel, Log, Record};
+use crate::data::{Log, Record};
+use crate::tests::channel;
 
 /// y(t) = 1.2 y(t-1) - 0.4 y(t-2) + 0.5 u(t-1) + 0.3 + 0.01 t + 0.1 e(t).
 fn signals(seed: u64, count: usize) -> (Vec<f64>, Vec<f64>) {
@@ -67,7 +68,7 @@ fn with_line(orders: &Orders, beside: &Beside) -> Estimate {
 }
 
 fn beside(count: usize) -> Beside {
-    let channel = Channel { name: "y".into(), values: vec![0.0; count] };
+    let channel = channel("y", vec![0.0; count]);
     let log = Log::new(vec![channel], 0.5).unwrap();
     Beside::new(&log, &[10..90, 100..180], true).unwrap()
 }

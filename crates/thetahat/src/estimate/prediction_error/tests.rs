@@ -5,17 +5,7 @@ use thetahat_numerics::optimize::{Algorithm, Step};
 
 use super::*;
 use crate::estimate::Procedure;
-
-/// The response of numerator/denominator from rest.
-fn filtered(numerator: &[f64], denominator: &[f64], signal: &[f64]) -> Vec<f64> {
-    let mut response: Vec<f64> = Vec::new();
-    for t in 0..signal.len() {
-        let driven: f64 = (0..numerator.len().min(t + 1)).map(|i| numerator[i] * signal[t - i]).sum();
-        let past: f64 = (1..denominator.len().min(t + 1)).map(|i| denominator[i] * response[t - i]).sum();
-        response.push(driven - past);
-    }
-    response
-}
+use crate::tests::filtered;
 
 /// A Box-Jenkins plant: its input and its output.
 fn box_jenkins(length: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {

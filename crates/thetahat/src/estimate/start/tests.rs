@@ -18,11 +18,6 @@ use crate::model::{
     polynomial::{is_stable, product},
 };
 
-/// Nearly normal, of unit variance.
-fn normal(noise: &mut Noise, count: usize) -> Vec<f64> {
-    (0..count).map(|_| (0..12).map(|_| noise.uniform()).sum::<f64>() / 2.0).collect()
-}
-
 /// x = (B/F) u from rest, B written with its delay.
 fn response(b: &[f64], f: &[f64], u: &[f64]) -> Vec<f64> {
     let whole = 0..u.len();
@@ -91,10 +86,10 @@ impl Modes<'_> {
     fn sample(&self, seed: u64) -> Sample {
         let mut noise = Noise(1000 + seed);
         let (b, f) = modal_plant(self.angles, self.radius, &mut noise);
-        let mut u = normal(&mut noise, 1000 + self.samples);
+        let mut u = noise.take_normal(1000 + self.samples);
         let x = response(&b, &f, &u).split_off(1000);
         let size = (sum_of_squares(&x) / self.samples as f64 / self.signal_to_noise).sqrt();
-        let y = x.iter().zip(normal(&mut noise, self.samples)).map(|(x, e)| x + size * e).collect();
+        let y = x.iter().zip(noise.take_normal(self.samples)).map(|(x, e)| x + size * e).collect();
         Sample { u: u.split_off(1000), y, b, f }
     }
 

@@ -3,12 +3,13 @@
 use thetahat_core::nalgebra::{Complex, DVector};
 use thetahat_numerics::random::Random;
 
-use crate::data::{Channel, Log, Rows};
+use crate::data::{Log, Rows};
 use crate::filter::kind::{Kind, Motion};
 use crate::filter::{Estimator, InitialState, ObserverGain, StateFilter, StateModel};
 use crate::model::{Activation, Model};
 use crate::report::{InputLags, MapPlan, NonlinearArxPlan, Report, apply, fit_nonlinear_arx};
 use crate::respond::{Horizon, InitialCondition};
+use crate::tests::{assert_refused, channel};
 
 /// y(k) = 0.7 y(k-1) + 0.1 y(k-2) + 0.5 tanh(u(k) + u(k-1)) + e(k), in other units.
 fn log() -> Log {
@@ -23,7 +24,6 @@ fn log() -> Log {
     }
     y.iter_mut().for_each(|y| *y = 20.0 + 3.0 * *y);
     let z: Vec<f64> = y.iter().zip(&u).map(|(y, u)| 0.1 * y * y + u).collect();
-    let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
     Log::new(vec![channel("u", &u), channel("y", &y), channel("z", &z)], 0.5).unwrap()
 }
 
@@ -173,15 +173,14 @@ fn it_starts_and_observes() {
     let model = StateModel::from_report(&report, Some(InitialState::Zero)).unwrap();
     assert_eq!(model.states(), ["y(k)", "y(k-1)", "u(k-1)"]);
     assert!(!model.is_linear());
-    assert!(StateFilter::new(model.clone(), Estimator::Kalman).unwrap_err().to_string().contains("ekf"));
+    assert_refused(StateFilter::new(model.clone(), Estimator::Kalman), "ekf");
     let log = log();
     let (u, y) = (values(&log, "u"), values(&log, "y"));
     // Of y(k-1) and u(k-1) the output shows one sum alone: poles for three states there are not, but gains.
     let poles = ObserverGain::Poles([0.1, 0.2, 0.3].map(|pole| Complex::new(pole, 0.0)).to_vec());
     let mut observer = StateFilter::new(model.clone(), Estimator::Luenberger(poles)).unwrap();
     let steps = u.iter().zip(&y).map(|(u, y)| observer.step(None, &[*u], &[*y]).map(|_| ()));
-    let error = steps.collect::<Result<Vec<()>, _>>().unwrap_err().to_string();
-    assert!(error.contains("told from the outputs"), "{error}");
+    assert_refused(steps.collect::<Result<Vec<()>, _>>(), "told from the outputs");
     let gain = ObserverGain::Matrix(vec![vec![0.7], vec![1.0], vec![0.0]]);
     let mut observer = StateFilter::new(model.clone(), Estimator::Luenberger(gain)).unwrap();
     let innovations =
@@ -196,18 +195,20 @@ fn it_starts_and_observes() {
     let first = filter.step(None, &[0.0], &[y[0]]).unwrap();
     assert!(first.filtered.unwrap().standard_deviations.unwrap().iter().all(|one| *one < 1e-9));
 
-    let refused =
-        |deviations: &[f64]| model.clone().with_measurement_noise(deviations).unwrap_err().to_string();
-    assert!(refused(&[]).contains("there are 0"), "{}", refused(&[]));
-    for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(refused(&[wrong]).contains("no standard deviation"), "{}", refused(&[wrong]));
+    for (deviations, words) in [
+        (&[][..], "there are 0"),
+        (&[-1.0], "no standard deviation"),
+        (&[f64::NAN], "no standard deviation"),
+        (&[f64::INFINITY], "no standard deviation"),
+        (&[1e300], "measurement-noise"),
+    ] {
+        assert_refused(model.clone().with_measurement_noise(deviations), words);
     }
-    assert!(refused(&[1e300]).contains("measurement-noise"), "{}", refused(&[1e300]));
     let mut silent = report.clone();
     let Model::NonlinearArx(own) = &mut silent.model else { panic!("{:?}", silent.model) };
     own.noise_covariance = vec![vec![0.0]];
     let error = StateModel::from_report(&silent, None).unwrap_err().to_string();
     assert!(error.starts_with("its noise variance is 0"), "{error}");
     let linear = StateModel::from_toml(super::NILE).unwrap();
-    assert!(linear.with_measurement_noise(&[1.0]).unwrap_err().to_string().contains("nonlinear ARX"));
+    assert_refused(linear.with_measurement_noise(&[1.0]), "nonlinear ARX");
 }

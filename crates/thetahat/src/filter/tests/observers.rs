@@ -4,6 +4,7 @@ use thetahat_core::{Action, Covariance, LinearObservation, LinearTransition, Lue
 use super::filter;
 use crate::filter::{Estimator, ObserverGain, StateFilter, StateModel};
 use crate::model::GreyBox;
+use crate::tests::assert_refused;
 
 const CART: &str = "\
 sample_time = 1
@@ -124,5 +125,5 @@ fn what_does_not_fit_an_observer_is_refused() {
             .contains("an observer estimates no parameters (mass)")
     );
     let smoothed = filter(CART, poles(&[(0.5, 0.0), (0.2, 0.0)])).recording().smooth();
-    assert!(smoothed.unwrap_err().to_string().contains("an observer knows no noises"));
+    assert_refused(smoothed, "an observer knows no noises");
 }

@@ -1,5 +1,6 @@
 use super::{FLOW, NILE, filter};
 use crate::filter::{Estimator, StateFilter};
+use crate::tests::near;
 
 const TRACK: &str = "\
 sample_time = 1
@@ -11,11 +12,6 @@ Q = [[0.25, 0.5], [0.5, 1]]
 R = [[1]]
 P0 = [[10, 0], [0, 10]]
 ";
-
-fn near(found: &[f64], expected: &[f64], tolerance: f64) -> bool {
-    found.len() == expected.len()
-        && found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < tolerance)
-}
 
 /// The filtered state and its variances after a row.
 fn filtered(filter: &mut StateFilter, outputs: &[f64]) -> (Vec<f64>, Vec<f64>) {

@@ -1,11 +1,12 @@
 use thetahat_numerics::noise::Noise;
 
 use crate::Error;
-use crate::data::{Channel, Log, Offset, Record};
+use crate::data::{Log, Offset, Record};
 use crate::filter::{Estimator, InitialState, StateFilter, StateModel, linear::Linear};
 use crate::model::{Model, Orders, PolynomialModel};
 use crate::report::{Plan, StateSpacePlan, fit_state_space, identify};
 use crate::respond::{Horizon, InitialCondition, predict};
+use crate::tests::channel;
 
 /// Models of all structures: na, nb, nc, nd, nf, nk and their parameters a, b, c, d, f.
 fn models() -> Vec<PolynomialModel> {
@@ -46,8 +47,8 @@ fn predictions_are_those_of_the_difference_equation() {
         model.output.name = "y".to_owned();
         model.output.offset = Offset { level: -2.0, slope: 0.02 };
         let mut noise = Noise(17);
-        let u: Vec<Vec<f64>> = (0..inputs).map(|_| (0..80).map(|_| noise.normal()).collect()).collect();
-        let y: Vec<f64> = (0..80).map(|_| noise.normal()).collect();
+        let u: Vec<Vec<f64>> = (0..inputs).map(|_| noise.take_normal(80)).collect();
+        let y: Vec<f64> = noise.take_normal(80);
         let record = Record::new(&y, u.iter().map(Vec::as_slice).collect()).unwrap();
         let expected = predict(&model, &record, 1, InitialCondition::Zero).unwrap().values;
 
@@ -92,7 +93,6 @@ fn a_report_of_a_fit_is_a_model() {
     for t in 1..300 {
         y[t] = 0.8 * y[t - 1] + 0.5 * u[t - 1] + 0.1 * noise.normal();
     }
-    let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
     let plan = Plan::new(&["u"], "y", Orders::arx(1, &[1], &[1]).unwrap());
     let identified = identify(log, &[], &plan).unwrap();
@@ -138,7 +138,6 @@ fn predictions_through_missing_outputs_are_those_of_the_filter() -> Result<(), E
         }
         x = [0.8 * x[0] + 0.3 * x[1] + input + 0.5 * e[0], 0.7 * x[1] + 0.4 * e[0] + 0.3 * e[1]];
     }
-    let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
     let log =
         |y: &[Vec<f64>; 2]| Log::new(vec![channel("u", &u), channel("y1", &y[0]), channel("y2", &y[1])], 0.5);
     let plan = StateSpacePlan { orders: Some(2..=2), ..StateSpacePlan::new(&["u"], &["y1", "y2"]) };

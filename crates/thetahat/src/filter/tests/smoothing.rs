@@ -3,6 +3,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::{FLOW, NILE, filter};
 use crate::filter::Estimator;
 use crate::model::equations::tests::CART;
+use crate::tests::assert_refused;
 
 #[test]
 fn the_last_state_is_the_filtered_one() {
@@ -98,8 +99,8 @@ fn constant_parameters_are_the_same_in_all_rows() {
 fn it_needs_all_rows() {
     let mut plain = filter(NILE, Estimator::Kalman);
     plain.step(None, &[], &[1.0]).unwrap();
-    assert!(plain.smooth().unwrap_err().to_string().contains("not recorded from the first one on"));
+    assert_refused(plain.smooth(), "not recorded from the first one on");
     let late = plain.recording();
-    assert!(late.smooth().unwrap_err().to_string().contains("not recorded from the first one on"));
+    assert_refused(late.smooth(), "not recorded from the first one on");
     assert_eq!(filter(NILE, Estimator::Kalman).recording().smooth().unwrap().rows(), 0);
 }

@@ -1,6 +1,7 @@
 //! The quality of single channels, and the clock.
 
 use super::*;
+use crate::tests::channel;
 
 const NONE: f64 = f64::NAN;
 
@@ -49,7 +50,7 @@ fn offsets_and_sizes_lose_nothing() {
 #[test]
 fn a_line_is_all_trend() {
     let times = Times::Uniform(0.5);
-    let line = Channel { name: "x".into(), values: (0..50).map(|row| 7.0 - 0.25 * f64::from(row)).collect() };
+    let line = channel("x", (0..50).map(|row| 7.0 - 0.25 * f64::from(row)).collect::<Vec<_>>());
     let (found, _) = channel::quality(&line, Some("input"), &times);
     assert!((found.trend.unwrap() + 0.5).abs() < 1e-14);
     assert!((found.trend_share.unwrap() - 1.0).abs() < 1e-14);

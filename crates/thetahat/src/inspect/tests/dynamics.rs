@@ -3,6 +3,7 @@
 use thetahat_numerics::regression::Lagged;
 
 use super::*;
+use crate::tests::channel;
 
 #[test]
 fn noise_and_no_drift_is_rest() {
@@ -288,7 +289,6 @@ fn the_impulse_responses_are_those_of_the_plant() {
     let other = sum_of(&late(&one, 1), 0.5, &normal(9, 2000));
     let y = sum_of(&sum_of(&late(&one, 2), -1.0, &late(&other, 4)), 0.1, &e);
     let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| 30.0 + 7.0 * value).collect() };
-    let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
     let channels = vec![channel("one", one), channel("other", scaled(&other)), channel("y", y)];
     let plan = InspectionPlan {
         inputs: vec!["one".into(), "other".into()],

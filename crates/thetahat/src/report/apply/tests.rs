@@ -1,7 +1,7 @@
 use super::*;
-use crate::data::Channel;
 use crate::model::{Orders, PolynomialModel};
 use crate::respond::prediction_deviation;
+use crate::tests::channel;
 
 /// A(q) y = B(q) u + e around levels and slopes, with an input if there is a B.
 fn model(a: f64, b: &[f64]) -> PolynomialModel {
@@ -16,10 +16,6 @@ fn model(a: f64, b: &[f64]) -> PolynomialModel {
         input.offset = Offset { level: -1.0, slope: 0.0 };
     }
     model
-}
-
-fn channel(name: &str, values: &[f64]) -> Channel {
-    Channel { name: name.to_owned(), values: values.to_vec() }
 }
 
 /// What `y` is measured from in a row (0-based).

@@ -1,9 +1,10 @@
 use thetahat_numerics::noise::Noise;
 
-use crate::data::{Channel, Log, Rows};
+use crate::data::{Log, Rows};
 use crate::model::{Hold, Model, Orders, TimeBase};
 use crate::report::{Plan, Report, StateSpacePlan, ValidationPlan, fit_state_space, identify, validate};
 use crate::respond::{Horizon, InitialCondition};
+use crate::tests::channel;
 use crate::{Document, Error};
 
 /// A plant with poles at 0.95 and 0.8 whose input changes every fifth sample, with noise of its state and its sensor,
@@ -19,10 +20,8 @@ fn log(step: usize) -> Result<Log, Error> {
         y.push(3.0 + x[0] + 0.3 * noise.uniform());
         x = [0.95 * x[0] + x[1] + 0.1 * noise.uniform(), 0.8 * x[1] + 0.2 * held];
     }
-    let channel = |name: &str, values: &[f64]| {
-        let values = values.iter().copied().step_by(step).collect();
-        Channel { name: name.to_owned(), values }
-    };
+    let channel =
+        |name: &str, values: &[f64]| channel(name, values.iter().copied().step_by(step).collect::<Vec<_>>());
     Log::new(vec![channel("u", &u), channel("y", &y)], 0.01 * step as f64)
 }
 

@@ -1,10 +1,10 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::Channel;
 use crate::report::{StateSpacePlan, fit_state_space};
 use crate::select::{Automatic, Select};
 use crate::select::{Grid, OrderRange, Path};
+use crate::tests::channel;
 
 #[test]
 fn figures_that_wait_are_the_same() {
@@ -15,7 +15,6 @@ fn figures_that_wait_are_the_same() {
         y[t] = 20.0 + 0.8 * (y[t - 1] - 20.0) + 0.5 * u[t - 1] + 0.1 * e[t];
     }
     y[300] = f64::NAN;
-    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.1).unwrap();
     let one = OrderRange::new(1, 1).unwrap();
     let grid = Grid {
@@ -46,14 +45,13 @@ fn a_fit_in_a_band_knows_how_sure_it_is_and_what_noise_there_is() {
     let mut noise = Noise(7);
     let orders = Orders::oe(&[1], &[1], &[1]).unwrap();
     let truth = [0.5, -0.8];
-    let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
     let (runs, samples) = (100, 500);
     let (mut squares, mut variance) = ([0.0; 2], 0.0);
     for _ in 0..runs {
         let u = noise.take(samples);
         let mut x = vec![0.0];
         (1..samples).for_each(|t| x.push(0.8 * x[t - 1] + 0.5 * u[t - 1]));
-        let y = x.iter().map(|x| x + 0.3 * noise.normal()).collect();
+        let y: Vec<f64> = x.iter().map(|x| x + 0.3 * noise.normal()).collect();
         let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
         let prefilter = Some("0.01..0.2".parse().unwrap());
         let plan = Plan { prefilter, detrend: Detrend::None, ..Plan::new(&["u"], "y", orders.clone()) };
@@ -101,7 +99,6 @@ fn modes() -> Result<Log, Error> {
     let deviations: Vec<f64> = y.iter().map(|y| y - 3.0).collect();
     let small = 0.1 * size(&deviations) / size(&e);
     y.iter_mut().zip(&e).for_each(|(y, e)| *y += small * e);
-    let channel = |name: &str, values: Vec<f64>| Channel { name: name.into(), values };
     Log::new(vec![channel("u", u), channel("y", y)], 0.1)
 }
 

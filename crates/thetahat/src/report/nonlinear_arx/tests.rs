@@ -6,12 +6,13 @@ mod outputs_and_expressions;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::{Channel, Detrend};
+use crate::data::Detrend;
 use crate::estimate::Constant;
 use crate::model::Orders;
 use crate::report::{Plan, ValidationPlan, fit_nonlinear_arx, identify, validate};
 use crate::respond::InitialCondition;
 use crate::select::Select;
+use crate::tests::{assert_refused, channel};
 
 /// y(t) = 0.5 y(t-1) + u(t-1) + square u(t-1)^2 + cube u(t-1)^3 + e(t), e about normal with a standard deviation of
 /// 0.05.
@@ -24,7 +25,6 @@ fn log(rows: usize, seed: u64, square: f64, cube: f64) -> Log {
         let e: f64 = noise.take(12).iter().sum();
         y.push(0.5 * y[t - 1] + x + square * x * x + cube * x * x * x + 0.025 * e);
     }
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
 }
 
@@ -220,8 +220,7 @@ fn free_runs_that_grow_have_no_figure() {
 #[test]
 fn what_cannot_be_is_refused() {
     let refused = |log: &Log, plan: NonlinearArxPlan, what: &str| {
-        let error = fit_nonlinear_arx(log, &[], &plan).unwrap_err().to_string();
-        assert!(error.contains(what), "{error}");
+        assert_refused(fit_nonlinear_arx(log, &[], &plan), what);
     };
     let good = log(100, 1, 0.4, 0.0);
     refused(&good, NonlinearArxPlan { map: MapPlan::Polynomial { degree: 0 }, ..plan() }, "degree");
@@ -246,7 +245,6 @@ fn what_cannot_be_is_refused() {
         |centres| NonlinearArxPlan { map: MapPlan::Radial { centres, width: None, linear: true }, ..plan() };
     refused(&good, radial(Centres::Grid { each: 1000 }), "centres");
     refused(&good, radial(Centres::Clusters { count: 0, seed: 0 }), "centres");
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     let constant = Log::new(vec![channel("u", vec![1.0; 50]), channel("y", vec![2.0; 50])], 1.0).unwrap();
     refused(&constant, plan(), "is constant");
     let missing = Log::new(vec![channel("u", vec![f64::NAN; 50]), channel("y", vec![2.0; 50])], 1.0).unwrap();

@@ -3,13 +3,9 @@ use std::ops::ControlFlow;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
-use crate::data::Channel;
 use crate::respond::process::run;
 use crate::respond::{Horizon, InitialCondition};
-
-fn channel(name: &str, values: &[f64]) -> Channel {
-    Channel { name: name.to_owned(), values: values.to_vec() }
-}
+use crate::tests::{assert_refused, channel};
 
 fn fit(log: &Log, plan: &ProcessPlan) -> Result<Report, Error> {
     fit_process(log, &[], plan, &|_| ControlFlow::Continue(()))
@@ -185,8 +181,7 @@ fn what_cannot_be_found_is_told() {
         Log::recorded(vec![channel("u", u), channel("y", y)], times[..u.len()].to_vec()).unwrap()
     };
     let refused = |log: &Log, plan: &ProcessPlan, words: &str| {
-        let error = fit(log, plan).unwrap_err().to_string();
-        assert!(error.contains(words), "{error}");
+        assert_refused(fit(log, plan), words);
     };
     refused(&log(&vec![1.0; 300], &y), &plan("p1d"), "never changes");
     refused(&log(&u[..3], &y[..3]), &plan("p1d"), "never changes");

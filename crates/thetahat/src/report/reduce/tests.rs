@@ -1,8 +1,9 @@
 use thetahat_numerics::noise::Noise;
 
-use crate::data::{Channel, Log};
+use crate::data::Log;
 use crate::model::Orders;
 use crate::report::{Plan, Report, ValidationPlan, identify, validate};
+use crate::tests::channel;
 use crate::{Document, Error};
 
 #[test]
@@ -15,7 +16,6 @@ fn a_reduced_report_goes_on_as_others_do() {
             y.push(1.3 * y[t - 1] - 0.4 * y[t - 2] + u[t - 1] + 0.1 * noise.uniform());
         }
     }
-    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
     let log = Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap();
     let plan = Plan::new(&["u"], "y", Orders::arx(4, &[4], &[1]).unwrap());
     let report = identify(log.clone(), &[], &plan).unwrap();

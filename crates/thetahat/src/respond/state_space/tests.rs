@@ -9,6 +9,7 @@ use crate::model::{LinearModel, Model, Orders, PolynomialModel, Signal, StateSpa
 use crate::respond::{
     Horizon, InitialCondition, OnLog, PolynomialOnLog, frequency_response, impulse_response, step_response,
 };
+use crate::tests::{assert_refused, channel};
 
 fn signal(name: &str) -> Signal {
     Signal { name: name.to_owned(), offset: Offset::default() }
@@ -42,7 +43,6 @@ fn log(model: &PolynomialModel, rows: usize) -> Log {
         y.push((&h * &state + &d * &u)[(0, 0)] + e[t]);
         state = &f * state + &g * u + &k * e[t];
     }
-    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
     Log::new(vec![channel("u1", u1), channel("u2", u2), channel("y", y)], 0.1).unwrap()
 }
 
@@ -166,18 +166,20 @@ fn inputs_that_wait_act_so_much_later() {
 #[test]
 fn a_damaged_model_is_refused() {
     let (_, states) = pair();
-    let refused = |change: fn(&mut StateSpaceModel)| {
+    let cases: [(fn(&mut StateSpaceModel), &str); 9] = [
+        (|model| model.f[0].truncate(1), "f is not 2 x 2"),
+        (|model| model.g[1][0] = f64::NAN, "g has a value that is not finite"),
+        (|model| model.delays = vec![1], "delays"),
+        (|model| model.delays = vec![usize::MAX, 1], "delays"),
+        (|model| model.noise_covariance[0][0] = -1.0, "noise_covariance"),
+        (|model| model.outputs.clear(), "outputs has none"),
+        (|model| model.inputs[1].name = "y".to_owned(), "'y' twice"),
+        (|model| model.poles.clear(), "poles"),
+        (|model| model.sample_time = 0.0, "sample_time"),
+    ];
+    for (change, words) in cases {
         let mut model = states.clone();
         change(&mut model);
-        Model::from(model).check().unwrap_err().to_string()
-    };
-    assert!(refused(|model| model.f[0].truncate(1)).contains("f is not 2 x 2"));
-    assert!(refused(|model| model.g[1][0] = f64::NAN).contains("g has a value that is not finite"));
-    assert!(refused(|model| model.delays = vec![1]).contains("delays"));
-    assert!(refused(|model| model.delays = vec![usize::MAX, 1]).contains("delays"));
-    assert!(refused(|model| model.noise_covariance[0][0] = -1.0).contains("noise_covariance"));
-    assert!(refused(|model| model.outputs.clear()).contains("outputs has none"));
-    assert!(refused(|model| model.inputs[1].name = "y".to_owned()).contains("'y' twice"));
-    assert!(refused(|model| model.poles.clear()).contains("poles"));
-    assert!(refused(|model| model.sample_time = 0.0).contains("sample_time"));
+        assert_refused(Model::from(model).check(), words);
+    }
 }

@@ -3,9 +3,10 @@
 use thetahat_numerics::noise::Noise;
 
 use crate::Error;
-use crate::data::{Channel, Log, Record, Rows};
+use crate::data::{Log, Record, Rows};
 use crate::model::{Orders, PolynomialModel};
 use crate::respond::{Draws, InitialCondition, draw, simulate};
+use crate::tests::channel;
 
 fn diagonal(variances: &[f64]) -> Vec<Vec<f64>> {
     let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
@@ -155,7 +156,6 @@ fn runs_go_on_where_an_output_is_missing() {
         (Orders::bj(&[1], 0, 1, &[1], &[1]).unwrap(), &[1.0, -0.8, -0.5]),
     ] {
         let model = PolynomialModel::from_parameters(&orders, parameters, None, 1.0, 1.0).unwrap();
-        let channel = |name: &str, values: Vec<f64>| Channel { name: name.to_owned(), values };
         let mut y = Noise(5).take(30);
         y[10..14].fill(f64::NAN);
         y[20] = f64::NAN;

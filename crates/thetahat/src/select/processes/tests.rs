@@ -1,6 +1,7 @@
 use super::*;
-use crate::data::{Channel, Log, Record, Rows};
+use crate::data::{Log, Record, Rows};
 use crate::respond::process::held_logs;
+use crate::tests::channel;
 
 #[test]
 fn a_step_test_has_few_steps_and_waits_for_what_they_do() {
@@ -26,7 +27,6 @@ fn a_step_test_has_few_steps_and_waits_for_what_they_do() {
 fn of_a_long_log_every_so_many_rows_are_seen_and_all_steps() {
     let u: Vec<f64> = (0..9001).map(|t| if t < 3001 { 0.0 } else { 1.0 }).collect();
     let y: Vec<f64> = (0..9001).map(f64::from).collect();
-    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
     let log = Log::new(vec![channel("u", &u), channel("y", &y)], 0.5).unwrap();
     let held = held_logs(&log, &["u"], &[Rows::new(1, 6000).unwrap()]).unwrap();
     let record = Record { segments: held[0].counted.clone(), ..Record::new(&y, vec![&u]).unwrap() };

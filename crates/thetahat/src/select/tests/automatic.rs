@@ -216,18 +216,7 @@ fn the_smallest_models_stay_whatever_their_searches_take() {
     let inputs: Vec<Vec<f64>> = (0..25).map(|_| noise.take(5000)).collect();
     let record = Record::new(&y, inputs.iter().map(Vec::as_slice).collect()).unwrap();
     let (names, search) = (vec![String::new(); 25], Search::default());
-    let task = Task {
-        estimation: &record,
-        validation: None,
-        inputs: &names,
-        select: Select::MDL,
-        focus: Focus::Auto,
-        initial: Initial::Auto,
-        may_drift: false,
-        search: &search,
-        deadline: Deadline::default(),
-        monitor: &|_| ControlFlow::Continue(()),
-    };
+    let task = Task { may_drift: false, ..task(&record, &names, &search) };
     let (one, two) = (vec![1; 25], vec![2; 25]);
     let oe = |orders: &[usize]| Orders::oe(orders, orders, &one).unwrap();
     let arx = Orders::arx(4, &two, &one).unwrap();

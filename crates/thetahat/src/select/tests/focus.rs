@@ -86,15 +86,7 @@ fn figures_of_blocks_are_those_of_single_fits() {
     let y = sum(&filtered(&[0.0, 1.0, 0.5], &F, &u), &e, 0.4);
     let whole = Record::new(&y, vec![&u]).unwrap();
     let orders = Orders::arx(2, &[2], &[1]).unwrap();
-    let choice = Choice::Grid(Grid {
-        na: 2.into(),
-        nb: vec![2.into()],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        nk: vec![1.into()],
-        path: Path::All,
-    });
+    let choice = Choice::Grid(arx_grid(2.into(), &[2.into()], &[1.into()]));
     let found = focused(&whole, &choice, Focus::Simulation).unwrap().selection;
     let seen = found.chosen.held_out.unwrap();
     let mean = y.iter().sum::<f64>() / 330.0;
@@ -223,18 +215,8 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
     let inputs = ["u1".to_owned()];
     for (select, focus) in [(Select::Validation, Focus::Simulation), (Select::Cv, Focus::Simulation)] {
         let search = Search::default();
-        let task = Task {
-            estimation: &first,
-            validation: Some(&second),
-            inputs: &inputs,
-            select,
-            focus,
-            initial: Initial::Auto,
-            may_drift: false,
-            search: &search,
-            deadline: Deadline::default(),
-            monitor: &|_| ControlFlow::Continue(()),
-        };
+        let validation = Some(&second);
+        let task = Task { validation, select, focus, may_drift: false, ..task(&first, &inputs, &search) };
         let found = choose(&task, &Choice::Known(orders.clone())).unwrap();
         let held_out_mse = found.selection.chosen.held_out_mse.unwrap();
         // The noise that no model simulates: uniform within a half.

@@ -2,15 +2,7 @@ use super::*;
 use crate::estimate::arx;
 
 fn grid() -> Grid {
-    Grid {
-        na: range(1, 3),
-        nb: vec![range(1, 3)],
-        nk: vec![range(1, 2)],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        path: Path::All,
-    }
+    arx_grid(range(1, 3), &[range(1, 3)], &[range(1, 2)])
 }
 
 fn signals() -> (Vec<f64>, Vec<f64>) {

@@ -11,15 +11,7 @@ fn signals() -> ([Vec<f64>; 3], Vec<Range<usize>>) {
 }
 
 fn grid_of_two() -> Grid {
-    Grid {
-        na: range(0, 3),
-        nb: vec![range(0, 2), range(1, 3)],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        nk: vec![range(1, 3), range(0, 2)],
-        path: Path::All,
-    }
+    arx_grid(range(0, 3), &[range(0, 2), range(1, 3)], &[range(1, 3), range(0, 2)])
 }
 
 /// The mean of e^2 of one model on the samples after `first` of each segment.
@@ -79,15 +71,7 @@ fn costs_keep_their_digits_where_columns_are_nearly_dependent() {
     let u = filtered(&[1.0], &slow, &noise.take(400));
     let y = sum(&filtered(&[0.0, 1e-3], &slow, &u), &noise.take(400), 1e-4);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..400)));
-    let grid = Grid {
-        na: range(1, 6),
-        nb: vec![range(1, 6)],
-        nk: vec![range(1, 2)],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        path: Path::All,
-    };
+    let grid = arx_grid(range(1, 6), &[range(1, 6)], &[range(1, 2)]);
     let found = chosen(&record, None, &Choice::Grid(grid), Select::MDL, Initial::Auto).unwrap();
     assert_eq!(found.selection.failed, 0);
     for model in &found.selection.best {
@@ -103,15 +87,7 @@ fn of_exact_models_the_smallest_is_chosen() {
     let u = noise.take(200);
     let y = filtered(&[0.0, 0.0, 1.0, -0.4], &[1.0, -1.1, 0.3], &u);
     let record = Record::new(&y, vec![&u]).unwrap();
-    let grid = Grid {
-        na: range(1, 5),
-        nb: vec![range(1, 5)],
-        nk: vec![range(1, 4)],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        path: Path::All,
-    };
+    let grid = arx_grid(range(1, 5), &[range(1, 5)], &[range(1, 4)]);
     let all = ["mdl", "fpe", "aicc", "validation", "cv"];
     for select in all.map(|word| word.parse().unwrap()) {
         let found =
@@ -132,15 +108,7 @@ fn models_that_the_data_leave_open_are_counted_apart() {
     let u: Vec<f64> = (0..100).map(|t| if t % 2 == 0 { 1.0 } else { -0.5 }).collect();
     let y = sum(&filtered(&[0.0, 1.0], &[1.0, -0.5], &u), &noise.take(100), 0.1);
     let record = Record::new(&y, vec![&u]).unwrap();
-    let grid = Grid {
-        na: 1.into(),
-        nb: vec![range(1, 5)],
-        nk: vec![1.into()],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        path: Path::All,
-    };
+    let grid = arx_grid(1.into(), &[range(1, 5)], &[1.into()]);
     let selection =
         chosen(&record, None, &Choice::Grid(grid.clone()), Select::MDL, Initial::Auto).unwrap().selection;
     assert_eq!((selection.models, selection.failed), (2, 3));
@@ -157,15 +125,7 @@ fn models_with_more_parameters_than_samples_are_left_out() {
     let mut noise = Noise(13);
     let y = noise.take(12);
     let record = Record::new(&y, vec![]).unwrap();
-    let grid = Grid {
-        na: range(1, 8),
-        nb: vec![],
-        nk: vec![],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![],
-        path: Path::All,
-    };
+    let grid = arx_grid(range(1, 8), &[], &[]);
     let selection =
         chosen(&record, None, &Choice::Grid(grid), "aicc".parse().unwrap(), Initial::Auto).unwrap().selection;
     // Four samples have all eight before them.
@@ -201,15 +161,7 @@ fn of_equal_models_the_smaller_is_taken() {
     let (u, e) = (noise.take(200), noise.take(200));
     let y = filtered(&[1.0], &[1.0, -0.8], &e);
     let zero = vec![0.0; 200];
-    let grid = Grid {
-        na: range(1, 2),
-        nb: vec![range(0, 1)],
-        nk: vec![1.into()],
-        nc: 0.into(),
-        nd: 0.into(),
-        nf: vec![0.into()],
-        path: Path::All,
-    };
+    let grid = arx_grid(range(1, 2), &[range(0, 1)], &[1.into()]);
     let estimation = Record::new(&y, vec![&u]).unwrap();
     let validation = Record::new(&y, vec![&zero]).unwrap();
     let found =

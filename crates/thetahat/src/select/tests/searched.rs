@@ -195,18 +195,8 @@ fn whoever_watches_can_end_it() {
             ControlFlow::Break(())
         }
     };
-    let task = Task {
-        estimation: &record,
-        validation: None,
-        inputs: &["u".to_owned()],
-        select: Select::MDL,
-        focus: Focus::Prediction,
-        initial: Initial::Auto,
-        may_drift: true,
-        search: &Search::default(),
-        deadline: Deadline::default(),
-        monitor,
-    };
+    let (inputs, search) = (names(&record), Search::default());
+    let task = Task { focus: Focus::Prediction, monitor, ..task(&record, &inputs, &search) };
     assert_eq!(choose(&task, &choice), Err(Error::Interrupted));
     let search = Search { tolerance: -1.0, ..Search::default() };
     assert!(matches!(choose(&Task { search: &search, ..task }, &choice), Err(Error::Argument { .. })));

@@ -1,6 +1,7 @@
 //! What is refused or warned of, and how that is said.
 
 use super::*;
+use crate::tests::assert_refused;
 
 fn refused(log: &Log, plan: &SpectrumPlan) -> Error {
     spectrum(log, &[], plan).unwrap_err()
@@ -114,8 +115,7 @@ fn sines_that_are_not_whole_periods_are_refused() {
         (of(sine(500), Some(70), None), "the input does not repeat itself after 70 rows"),
         (of(sine(500), None, Some(5)), "rows 1 to 500 are 5 whole periods of 100 rows: none is left after 5"),
     ] {
-        let error = found.unwrap_err().to_string();
-        assert!(error.contains(says), "{error}");
+        assert_refused(found, says);
     }
     let single = of(sine(100), Some(100), None).unwrap();
     assert!(single.responses[0].points[0].covariance.is_none());

@@ -6,12 +6,6 @@ use thetahat_numerics::noise::Noise;
 
 use super::*;
 
-/// Gaussian numbers (Box and Muller 1958).
-fn gaussian(noise: &mut Noise) -> f64 {
-    let (radius, angle) = ((noise.uniform() + 1.0) / 2.0, noise.uniform());
-    (-2.0 * (1.0 - radius).ln()).sqrt() * (PI * angle).cos()
-}
-
 #[test]
 fn run_lengths_are_those_of_the_tables() {
     // Two-sided, reference value 1/2: Lucas and Crosier, Fast initial response for CUSUM quality-control schemes,
@@ -58,7 +52,7 @@ fn thresholds_make_the_intervals_they_are_for() {
 fn alarms(detector: &mut ChangeDetector<f64>, samples: usize) -> [f64; 3] {
     let (mut noise, mut alarms) = (Noise(5), [0.0; 3]);
     for _ in 0..samples {
-        let error = gaussian(&mut noise);
+        let error = noise.normal();
         let innovation = Innovation::new(error, 1.0, error * error, Action::Updated);
         let alarm = detector.update(&innovation);
         alarms[0] += f64::from(u8::from(alarm.is_some_and(|alarm| alarm.chart == Chart::MeanUp)));
@@ -93,16 +87,16 @@ fn alarms_of_a_filter(detector: &mut ChangeDetector<f64>, samples: usize, factor
     let prior = Covariance::from_diagonal(&Vector2::new(1.0, 1.0)).unwrap();
     let mut filter = KalmanFilter::new(Vector2::zeros(), prior).unwrap();
     let (mut noise, mut alarms, none) = (Noise(8), 0.0, SVector::zeros());
-    let mut state = Vector2::new(gaussian(&mut noise), gaussian(&mut noise));
+    let mut state = Vector2::new(noise.normal(), noise.normal());
     for _ in 0..samples {
         let factors = [1.0, factor, factor];
-        let error = Vector3::from_fn(|row, _| (variances[row] * factors[row]).sqrt() * gaussian(&mut noise));
+        let error = Vector3::from_fn(|row, _| (variances[row] * factors[row]).sqrt() * noise.normal());
         let measured = (rows * state + error)
             .map(|y| if (noise.uniform() + 1.0) * 500.0 < f64::from(missing) { f64::NAN } else { y });
         let innovation = filter.correct(&sensors, &none, &measured).unwrap();
         alarms += f64::from(u8::from(detector.update_all(&innovation).is_some()));
         filter.predict(&motion, &none).unwrap();
-        state = motion.state_matrix() * state + Vector2::new(0.0, 0.2 * gaussian(&mut noise));
+        state = motion.state_matrix() * state + Vector2::new(0.0, 0.2 * noise.normal());
     }
     alarms
 }

@@ -1,13 +1,13 @@
 //! Trackers that go on from a report.
 
 use super::*;
-use crate::data::{Channel, Detrend, Log};
+use crate::data::{Detrend, Log};
 use crate::report::{Plan, Report, identify};
+use crate::tests::channel;
 
 /// A fit of rows of the log.
 fn fit(inputs: &[[f64; 2]], y: &[f64], rows: &str, orders: Orders, detrend: Detrend) -> Report {
-    let channel = |name: &str, values: Vec<f64>| Channel { name: name.to_owned(), values };
-    let input = |j: usize| inputs.iter().map(|u| u[j]).collect();
+    let input = |j: usize| inputs.iter().map(|u| u[j]).collect::<Vec<_>>();
     let channels = vec![channel("u", input(0)), channel("v", input(1)), channel("y", y.to_vec())];
     let plan = Plan {
         estimate: vec![rows.parse().unwrap()],

@@ -1,4 +1,4 @@
-use super::{Simulated, normal, settings, tuner};
+use super::{Simulated, settings, tuner};
 use crate::noise::Noise;
 use crate::{Error, Sensor, TunerSettings, TunerState};
 
@@ -10,7 +10,7 @@ fn oven() -> Simulated {
 fn settled(settings: &TunerSettings<f32>) -> Result<(super::Tuner, Simulated, Noise), Error> {
     let (mut tuner, mut plant, mut noise) = (tuner(settings, 0.98)?, oven(), Noise(11));
     for k in 0..1000 {
-        let y = plant.output(0.005 * normal(&mut noise));
+        let y = plant.output(0.005 * noise.normal());
         let set_point = if k / 100 % 2 == 0 { -1.0 } else { 1.0 };
         plant.input(tuner.control(set_point, y as f32).into());
     }
@@ -25,7 +25,7 @@ fn strays(
 ) -> f64 {
     let mut farthest = 0.0_f64;
     for k in 0..samples {
-        let y = plant.output(0.005 * normal(noise));
+        let y = plant.output(0.005 * noise.normal());
         farthest = farthest.max((y - 1.0).abs());
         plant.input(tuner.control(1.0, measured(k, y as f32)).into());
     }
@@ -88,7 +88,7 @@ fn a_measurement_out_of_range_is_taken_as_the_end_of_the_range() -> Result<(), E
 fn a_set_point_that_cannot_be_reached_saturates_the_actuator_and_nothing_winds_up() -> Result<(), Error> {
     let (mut tuner, mut plant, mut noise) = settled(&settings())?;
     for _ in 0..500 {
-        let y = plant.output(0.005 * normal(&mut noise));
+        let y = plant.output(0.005 * noise.normal());
         let u = tuner.control(30.0, y as f32);
         assert!(u <= 10.0);
         plant.input(u.into());
@@ -106,7 +106,7 @@ fn a_set_point_that_cannot_be_reached_saturates_the_actuator_and_nothing_winds_u
 fn it_knows_what_the_actuator_did() -> Result<(), Error> {
     let (mut tuner, mut plant, mut noise) = settled(&settings())?;
     for k in 0..600 {
-        let y = plant.output(0.005 * normal(&mut noise));
+        let y = plant.output(0.005 * noise.normal());
         let u = (tuner.control(1.0, y as f32)).min(0.8);
         tuner.applied(u);
         tuner.applied(f32::NAN);
@@ -136,7 +136,7 @@ fn a_plant_that_changes_is_learnt_again() -> Result<(), Error> {
     for (index, next) in plants.iter().enumerate() {
         run.1.becomes(next);
         for k in 0..300 {
-            let y = run.1.output(0.005 * normal(&mut run.2));
+            let y = run.1.output(0.005 * run.2.normal());
             let set_point = if k / 50 % 2 == 0 { -1.0 } else { 1.0 };
             run.1.input(run.0.control(set_point, y as f32).into());
         }

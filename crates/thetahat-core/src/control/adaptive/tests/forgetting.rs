@@ -6,7 +6,7 @@ use std::println;
 use std::vec::Vec;
 
 use super::plants::random;
-use super::{ORDERS, Tuner, normal, settings};
+use super::{ORDERS, Tuner, settings};
 use crate::noise::Noise;
 use crate::{Error, Forgetting};
 
@@ -39,7 +39,7 @@ fn score(forgetting: Forgetting<f32>) -> Result<Score, Error> {
         let (mut plant, _) = random(&mut noise);
         let mut tuner = Tuner::new(&ORDERS, &settings(), 1.0, 1.0, forgetting)?;
         let mut sample = |plant: &mut super::Simulated, set_point: f64| {
-            let y = plant.output(DEVIATION * normal(&mut noise));
+            let y = plant.output(DEVIATION * noise.normal());
             plant.input(tuner.control(set_point as f32, y as f32).into());
             y
         };

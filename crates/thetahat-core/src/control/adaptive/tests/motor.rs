@@ -1,6 +1,6 @@
 use nalgebra::Const;
 
-use super::{Simulated, normal};
+use super::Simulated;
 use crate::control::tests::motor;
 use crate::noise::Noise;
 use crate::{
@@ -100,7 +100,7 @@ fn under_noise_the_model_is_within_three_standard_errors() -> Result<(), Error> 
             .with_peaks(100.0, 100.0)?;
         let mut plant = plant();
         for k in 0..200 {
-            let y = plant.output(0.01 * normal(&mut noise));
+            let y = plant.output(0.01 * noise.normal());
             plant.input(tuner.control(set_point(k), y));
         }
         let estimator = tuner.plant().estimator();

@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 use nalgebra::Const;
 
-use super::{Simulated, normal};
+use super::Simulated;
 use crate::control::polynomial::product;
 use crate::noise::Noise;
 use crate::{
@@ -34,7 +34,7 @@ fn run(seed: u64, mut control: impl FnMut(f64, f64) -> f64) -> [f64; 2] {
     let (mut noise, mut before, mut variances) = (Noise(seed), 0.0, [0.0; 2]);
     let mut plant = Simulated::new([1.0, TRUTH[0], TRUTH[1]], &TRUTH[2..4]);
     for k in 0..6000 {
-        let e = 0.05 * normal(&mut noise);
+        let e = 0.05 * noise.normal();
         let y = plant.output(e + TRUTH[5] * before);
         before = e;
         let changing = if k / 50 % 2 == 0 { 1.0 } else { -1.0 };
@@ -77,7 +77,7 @@ fn the_observer_is_that_of_the_noise() -> Result<(), Error> {
         Armax::<{ SMALL.parameters() }, { SMALL.size() }>::new(&SMALL, &wanted(), 1.0, 1.0, FORGETTING)?;
     let (mut noise, mut before, mut plant) = (Noise(3), 0.0, Simulated::new([1.0, -0.9, 0.0], &[0.2]));
     for k in 0..2000 {
-        let e = 0.02 * normal(&mut noise);
+        let e = 0.02 * noise.normal();
         let y = plant.output(e - 0.7 * before);
         before = e;
         plant.input(tuner.control(if k / 50 % 2 == 0 { 1.0 } else { -1.0 }, y));

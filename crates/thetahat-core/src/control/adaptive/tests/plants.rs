@@ -5,7 +5,7 @@ use std::vec;
 
 use nalgebra::Const;
 
-use super::{Simulated, normal, settings, tuner};
+use super::{Simulated, settings, tuner};
 use crate::noise::Noise;
 use crate::{DirectOrders, DirectSelfTuner, Distrust, Error, Forgetting};
 
@@ -51,7 +51,7 @@ fn settles<C: Clone>(
 ) -> bool {
     let (mut farthest, samples) = (0.0_f64, 2400);
     for k in 0..samples {
-        let y = plant.output(DEVIATION * normal(noise));
+        let y = plant.output(DEVIATION * noise.normal());
         let set_point = if k / 300 % 2 == 0 { 1.0 } else { -1.0 };
         let input = f64::from(control(tuner, set_point as f32, y as f32));
         assert!(input.abs() <= 10.0);
@@ -74,7 +74,7 @@ fn deviation(plant: &Simulated, noise: &mut Noise, mut control: impl FnMut(f32) 
     let mut plant = plant.clone();
     let (mut sum, mut squares) = (0.0, 0.0);
     for k in 0..2500 {
-        let y = plant.output(DEVIATION * normal(noise));
+        let y = plant.output(DEVIATION * noise.normal());
         plant.input(f64::from(control(y as f32)));
         if k >= 500 {
             sum += y / 2000.0;

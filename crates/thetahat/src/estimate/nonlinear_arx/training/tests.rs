@@ -2,9 +2,10 @@
 
 use super::objective::{Lost, RunErrors};
 use super::*;
-use crate::data::{Channel, Detrend, Log};
+use crate::data::{Detrend, Log};
 use crate::model::{Model, NonlinearArxModel};
 use crate::report::{InputLags, NonlinearArxPlan, fit_nonlinear_arx};
+use crate::tests::channel;
 use std::ops::ControlFlow;
 
 use thetahat_numerics::optimize::Objective;
@@ -20,7 +21,6 @@ fn log(rows: usize) -> Log {
         let drive = if k > 0 { u[k - 1] } else { 0.0 };
         y[k] = 0.8 * last + 0.4 * (1.5 * drive - 0.5 * last).tanh() + 0.02 * random.normal();
     }
-    let channel = |name: &str, values| Channel { name: name.to_owned(), values };
     Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
 }
 

@@ -1,5 +1,6 @@
 use super::CART;
 use crate::model::GreyBox;
+use crate::tests::assert_refused;
 
 /// The error of the cart with one text in place of another.
 fn refused(from: &str, to: &str) -> String {
@@ -166,7 +167,7 @@ fn substeps_are_a_whole_number() {
             "{error}"
         );
     }
-    assert!(GreyBox::from_toml("").unwrap_err().to_string().contains("'sample_time' is missing"));
+    assert_refused(GreyBox::from_toml(""), "'sample_time' is missing");
 }
 
 #[test]

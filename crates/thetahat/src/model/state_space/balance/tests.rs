@@ -4,24 +4,21 @@ use thetahat_core::nalgebra::Complex;
 
 use super::*;
 use crate::model::{Orders, PolynomialModel};
-
-fn rows(rows: &[&[f64]]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
-}
+use crate::tests::matrix;
 
 fn two_by_two() -> StateSpace {
     StateSpace {
-        f: rows(&[
+        f: matrix(&[
             &[0.9, 0.3, 0.0, 0.0],
             &[-0.3, 0.7, 0.1, 0.0],
             &[0.0, 0.0, 0.5, -0.4],
             &[0.05, 0.0, 0.4, 0.5],
         ]),
-        g: rows(&[&[1.0, 0.0], &[0.5, -1.0], &[0.2, 0.7], &[0.0, 1.0]]),
-        h: rows(&[&[1.0, 0.0, 2.0, 0.0], &[0.0, 1.0, -1.0, 0.3]]),
-        d: rows(&[&[0.0, 0.3], &[0.1, 0.0]]),
-        k: rows(&[&[0.5, 0.1], &[0.1, 0.4], &[0.2, -0.1], &[0.0, 0.2]]),
-        noise_covariance: rows(&[&[0.5, 0.1], &[0.1, 0.2]]),
+        g: matrix(&[&[1.0, 0.0], &[0.5, -1.0], &[0.2, 0.7], &[0.0, 1.0]]),
+        h: matrix(&[&[1.0, 0.0, 2.0, 0.0], &[0.0, 1.0, -1.0, 0.3]]),
+        d: matrix(&[&[0.0, 0.3], &[0.1, 0.0]]),
+        k: matrix(&[&[0.5, 0.1], &[0.1, 0.4], &[0.2, -0.1], &[0.0, 0.2]]),
+        noise_covariance: matrix(&[&[0.5, 0.1], &[0.1, 0.2]]),
         sample_time: 1.0,
     }
 }
@@ -138,9 +135,9 @@ fn small_values_keep_their_digits() {
         f: DMatrix::from_diagonal(&poles.clone().into()),
         g: DMatrix::from_element(6, 1, 1.0),
         h: DMatrix::from_element(1, 6, 1.0),
-        d: rows(&[&[0.0]]),
+        d: matrix(&[&[0.0]]),
         k: DMatrix::zeros(6, 1),
-        noise_covariance: rows(&[&[1.0]]),
+        noise_covariance: matrix(&[&[1.0]]),
         sample_time: 1.0,
     };
     let values = model.hankel_singular_values().unwrap();
@@ -168,8 +165,8 @@ fn poles_that_do_not_decay_are_kept() {
     // A double integrator and an unstable pair beside it, all mixed.
     let mut f = DMatrix::zeros(8, 8);
     f.view_mut((0, 0), (4, 4)).copy_from(&stable.f);
-    f.view_mut((4, 4), (2, 2)).copy_from(&rows(&[&[1.0, 0.5], &[0.0, 1.0]]));
-    f.view_mut((6, 6), (2, 2)).copy_from(&rows(&[&[1.1, 0.4], &[-0.4, 1.1]]));
+    f.view_mut((4, 4), (2, 2)).copy_from(&matrix(&[&[1.0, 0.5], &[0.0, 1.0]]));
+    f.view_mut((6, 6), (2, 2)).copy_from(&matrix(&[&[1.1, 0.4], &[-0.4, 1.1]]));
     let mut g = stable.g.clone().insert_rows(4, 4, 0.3);
     g[(5, 1)] = -0.4;
     let mut h = stable.h.clone().insert_columns(4, 4, 0.5);

@@ -4,19 +4,16 @@ use thetahat_core::nalgebra::ComplexField;
 
 use super::*;
 use crate::model::{Orders, PolynomialModel};
-
-fn rows(rows: &[&[f64]]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
-}
+use crate::tests::{assert_refused, matrix};
 
 fn model() -> ContinuousStateSpace {
     ContinuousStateSpace {
-        a: rows(&[&[-0.5, 2.0, 0.0], &[-2.0, -0.5, 1.0], &[0.0, 0.0, -3.0]]),
-        b: rows(&[&[1.0, 0.0], &[0.0, 0.5], &[-1.0, 2.0]]),
-        c: rows(&[&[1.0, 0.0, 1.0]]),
-        d: rows(&[&[0.0, 0.25]]),
-        k: rows(&[&[0.7], &[0.2], &[-0.1]]),
-        noise_intensity: rows(&[&[0.04]]),
+        a: matrix(&[&[-0.5, 2.0, 0.0], &[-2.0, -0.5, 1.0], &[0.0, 0.0, -3.0]]),
+        b: matrix(&[&[1.0, 0.0], &[0.0, 0.5], &[-1.0, 2.0]]),
+        c: matrix(&[&[1.0, 0.0, 1.0]]),
+        d: matrix(&[&[0.0, 0.25]]),
+        k: matrix(&[&[0.7], &[0.2], &[-0.1]]),
+        noise_intensity: matrix(&[&[0.04]]),
     }
 }
 
@@ -53,14 +50,14 @@ fn apart_in_samples(one: &StateSpace, other: &StateSpace) -> f64 {
 #[test]
 fn sampled_models_are_those_of_scipy() {
     // scipy 1.17.1: scipy.signal.cont2discrete((A, B, C, D), 0.2, method), with zoh, foh and bilinear.
-    let f = rows(&[
+    let f = matrix(&[
         &[0.833410451667205, 0.3523602873904028, 0.030410057300453652],
         &[-0.35236028739040287, 0.833410451667205, 0.13816757206963434],
         &[0.0, 0.0, 0.5488116360940264],
     ]);
     let zero = model().sampled(0.2, Hold::Zero).unwrap();
     assert!(apart(&zero.f, &f) < 1e-14);
-    let g = rows(&[
+    let g = matrix(&[
         &[0.18323841861946266, 0.022824380262157204],
         &[-0.05269019816175869, 0.12420622421359366],
         &[-0.1503961213019912, 0.3007922426039824],
@@ -70,31 +67,31 @@ fn sampled_models_are_those_of_scipy() {
 
     let first = model().sampled(0.2, Hold::First).unwrap();
     assert!(apart(&first.f, &f) < 1e-14);
-    let g = rows(&[
+    let g = matrix(&[
         &[0.1585069470960436, 0.04737548230465309],
         &[-0.09453599679730408, 0.13461923806078577],
         &[-0.11309496651341625, 0.2261899330268325],
     ]);
     assert!(apart(&first.g, &g) < 1e-14);
-    assert!(apart(&first.d, &rows(&[&[0.012258556540707038, 0.42277434041188733]])) < 1e-14);
+    assert!(apart(&first.d, &matrix(&[&[0.012258556540707038, 0.42277434041188733]])) < 1e-14);
 
     let tustin = model().sampled(0.2, Hold::Tustin).unwrap();
-    let f = rows(&[
+    let f = matrix(&[
         &[0.838074398249453, 0.350109409190372, 0.026931493014644002],
         &[-0.3501094091903719, 0.8380743982494528, 0.141390338326881],
         &[0.0, 0.0, 0.5384615384615383],
     ]);
     assert!(apart(&tustin.f, &f) < 1e-14);
-    let g = rows(&[
+    let g = matrix(&[
         &[0.18111429052348088, 0.022891769062447397],
         &[-0.0491499747517253, 0.12018178757784884],
         &[-0.15384615384615385, 0.3076923076923077],
     ]);
     assert!(apart(&tustin.g, &g) < 1e-14);
     assert!(
-        apart(&tustin.h, &rows(&[&[0.9190371991247264, 0.17505470459518596, 0.7826965157380912]])) < 1e-14
+        apart(&tustin.h, &matrix(&[&[0.9190371991247264, 0.17505470459518596, 0.7826965157380912]])) < 1e-14
     );
-    assert!(apart(&tustin.d, &rows(&[&[0.013634068338663513, 0.41529203837737755]])) < 1e-14);
+    assert!(apart(&tustin.d, &matrix(&[&[0.013634068338663513, 0.41529203837737755]])) < 1e-14);
 }
 
 #[test]
@@ -132,12 +129,12 @@ fn one_sample_time_becomes_another() {
 fn a_ramp_is_exact_with_a_first_order_hold() {
     // dy/dt = -y + u, u = t from rest: y = t - 1 + e^-t.
     let lag = ContinuousStateSpace {
-        a: rows(&[&[-1.0]]),
-        b: rows(&[&[1.0]]),
-        c: rows(&[&[1.0]]),
-        d: rows(&[&[0.0]]),
-        k: rows(&[&[0.0]]),
-        noise_intensity: rows(&[&[1.0]]),
+        a: matrix(&[&[-1.0]]),
+        b: matrix(&[&[1.0]]),
+        c: matrix(&[&[1.0]]),
+        d: matrix(&[&[0.0]]),
+        k: matrix(&[&[0.0]]),
+        noise_intensity: matrix(&[&[1.0]]),
     };
     let sampled = lag.sampled(0.5, Hold::First).unwrap();
     let mut state = 0.0;
@@ -177,12 +174,12 @@ fn tustin_moves_frequencies_and_keeps_responses() {
 #[test]
 fn integrators_and_multiple_poles_come_back() {
     let chain = ContinuousStateSpace {
-        a: rows(&[&[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0], &[0.0, 0.0, 0.0]]),
-        b: rows(&[&[0.0], &[0.0], &[2.0]]),
-        c: rows(&[&[1.0, 0.0, 0.0]]),
-        d: rows(&[&[0.0]]),
-        k: rows(&[&[0.3], &[0.1], &[0.0]]),
-        noise_intensity: rows(&[&[2.0]]),
+        a: matrix(&[&[0.0, 1.0, 0.0], &[0.0, 0.0, 1.0], &[0.0, 0.0, 0.0]]),
+        b: matrix(&[&[0.0], &[0.0], &[2.0]]),
+        c: matrix(&[&[1.0, 0.0, 0.0]]),
+        d: matrix(&[&[0.0]]),
+        k: matrix(&[&[0.3], &[0.1], &[0.0]]),
+        noise_intensity: matrix(&[&[2.0]]),
     };
     let slow = ContinuousStateSpace { a: &chain.a - DMatrix::identity(3, 3) * 0.7, ..chain.clone() };
     for expected in [chain, slow] {
@@ -196,12 +193,12 @@ fn integrators_and_multiple_poles_come_back() {
 #[test]
 fn oscillations_come_back_slower_than_the_samples() {
     let oscillator = |frequency: f64| ContinuousStateSpace {
-        a: rows(&[&[-0.1, frequency], &[-frequency, -0.1]]),
-        b: rows(&[&[0.0], &[1.0]]),
-        c: rows(&[&[1.0, 0.0]]),
-        d: rows(&[&[0.0]]),
-        k: rows(&[&[0.0], &[0.0]]),
-        noise_intensity: rows(&[&[1.0]]),
+        a: matrix(&[&[-0.1, frequency], &[-frequency, -0.1]]),
+        b: matrix(&[&[0.0], &[1.0]]),
+        c: matrix(&[&[1.0, 0.0]]),
+        d: matrix(&[&[0.0]]),
+        k: matrix(&[&[0.0], &[0.0]]),
+        noise_intensity: matrix(&[&[1.0]]),
     };
     // Just below half a turn in a sample.
     let near = oscillator(0.999 * PI);
@@ -230,8 +227,7 @@ fn poles_without_a_logarithm_are_named() {
     let back = late.to_continuous(Hold::Tustin).unwrap().sampled(1.0, Hold::Tustin).unwrap();
     assert!(apart_in_samples(&back, &late) < 1e-13);
     let delays = space(Orders::arx(1, &[1], &[4]).unwrap(), &[-0.5, 1.0]);
-    let error = delays.to_continuous(Hold::Zero).unwrap_err().to_string();
-    assert!(error.contains("it has 3 poles at 0, delays of samples"), "{error}");
+    assert_refused(delays.to_continuous(Hold::Zero), "it has 3 poles at 0, delays of samples");
     let alternating = space(Orders::arx(1, &[1], &[1]).unwrap(), &[1.0, 1.0]);
     let error = alternating.to_continuous(Hold::Tustin).unwrap_err().to_string();
     assert!(error.starts_with("the model has a pole at -1, which `tustin` maps to infinity"), "{error}");
@@ -262,7 +258,7 @@ fn a_gain_without_states_stays_one() {
         let continuous = gain.to_continuous(hold).unwrap();
         assert_eq!(
             (continuous.d.clone(), continuous.noise_intensity.clone()),
-            (rows(&[&[2.0]]), rows(&[&[1.5]]))
+            (matrix(&[&[2.0]]), matrix(&[&[1.5]]))
         );
         assert_eq!(continuous.sampled(0.5, hold).unwrap(), gain);
     }

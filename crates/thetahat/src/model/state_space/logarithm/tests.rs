@@ -1,8 +1,7 @@
-use super::*;
+use thetahat_numerics::noise::Noise;
 
-fn matrix(rows: &[&[f64]]) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), rows[0].len(), |row, column| rows[row][column])
-}
+use super::*;
+use crate::tests::matrix;
 
 fn close(found: &DMatrix<f64>, expected: &DMatrix<f64>, tolerance: f64) -> bool {
     (found - expected).norm() <= tolerance * expected.norm().max(1.0)
@@ -67,15 +66,11 @@ fn logarithms_are_those_of_scipy() {
 
 #[test]
 fn logarithms_invert_exponentials() {
-    let mut random = 1_u32;
-    let mut sample = || {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        f64::from(random >> 16) / 32_768.0 - 1.0
-    };
+    let mut noise = Noise(1);
     for size in 1..=20 {
         // Eigenvalues with imaginary parts below pi: row sums are.
         let scale = 2.5 / size as f64;
-        let expected = DMatrix::from_fn(size, size, |_, _| scale * sample());
+        let expected = DMatrix::from_fn(size, size, |_, _| scale * noise.uniform());
         let [exponential, ..] = integrals(&expected).unwrap();
         let found = logarithm(&exponential).unwrap();
         assert!(close(&found, &expected, 1e-12), "{size}: {}", (found - expected).norm());

@@ -3,10 +3,11 @@ use std::ops::ControlFlow;
 use thetahat_numerics::random::Random;
 
 use crate::Error;
-use crate::data::{Channel, Log, Rows};
+use crate::data::{Log, Rows};
 use crate::estimate::{Answer, Ask, Question};
 use crate::model::GreyBox;
 use crate::report::{EquationsPlan, Report, answer_equations, fit_equations, fit_equations_distributed};
+use crate::tests::{assert_refused, channel};
 
 fn tank() -> GreyBox {
     let text = "sample_time = 1
@@ -37,8 +38,7 @@ fn log(seed: u64) -> Log {
         x += (u - 0.1 * x) / 2.0;
         y
     });
-    let channel = |name: &str, values| Channel { name: name.into(), values };
-    Log::new(vec![channel("y", y.collect()), channel("u", u)], 1.0).unwrap()
+    Log::new(vec![channel("y", y.collect::<Vec<_>>()), channel("u", u)], 1.0).unwrap()
 }
 
 fn distributed(logs: &[Log], each: usize, plan: &EquationsPlan) -> Result<Report, Error> {
@@ -83,7 +83,7 @@ fn holders_find_what_one_process_finds() {
 fn what_cannot_be_is_said() {
     let logs: Vec<Log> = (0..2).map(log).collect();
     let plan = EquationsPlan { estimate: vec![Rows::new(1, 100).unwrap()], ..EquationsPlan::default() };
-    assert!(distributed(&logs, 1, &plan).unwrap_err().to_string().contains("all rows serve"));
+    assert_refused(distributed(&logs, 1, &plan), "all rows serve");
     let plan = EquationsPlan::default();
     let joined = Log::join(logs.clone()).unwrap();
     let fit = |counts: &[usize], ask: Ask<'_>| {
@@ -98,7 +98,6 @@ fn what_cannot_be_is_said() {
     // Where the filter does not work, the row is that of all logs.
     let mut wild = logs[1].channel("y").unwrap().values.clone();
     wild[3] = 1e300;
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     let u = logs[1].channel("u").unwrap().values.clone();
     let wild = Log::new(vec![channel("y", wild), channel("u", u)], 1.0).unwrap();
     let both = [logs[0].clone(), wild];

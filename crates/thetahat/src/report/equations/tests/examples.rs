@@ -12,6 +12,7 @@ use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::{GreyBox, Model};
 use crate::report::{EquationsPlan, Report, ValidationPlan, fit_equations, validate};
 use crate::respond::{Horizon, NisSummary};
+use crate::tests::assert_refused;
 use crate::{Document, Error};
 
 fn data(name: &str) -> PathBuf {
@@ -218,7 +219,7 @@ fn reports_go_there_and_back() {
     }
     let mut lacking = stored.clone();
     lacking.parameters.clear();
-    assert!(lacking.with_values().unwrap_err().to_string().contains("torque_constant"));
+    assert_refused(lacking.with_values(), "torque_constant");
 }
 
 /// What the filter makes of a log: it estimates unknown parameters with the state.

@@ -1,11 +1,11 @@
 use super::models::experiment;
 use crate::Error;
-use crate::data::{Channel, Log, Recording, Times};
+use crate::data::{Log, Recording, Times};
 use crate::model::GreyBox;
 use crate::respond::equations::experiments;
+use crate::tests::channel;
 
 fn recording(times: Vec<f64>) -> Recording {
-    let channel = |name: &str, values: [f64; 4]| Channel { name: name.into(), values: values.to_vec() };
     Recording {
         channels: vec![
             channel("y", [1.0, f64::NAN, 3.0, 4.0]),

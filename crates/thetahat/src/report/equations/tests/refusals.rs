@@ -8,9 +8,10 @@ use thetahat_numerics::optimize::Stopped;
 
 use super::models::{Found, joined};
 use crate::Error;
-use crate::data::{Channel, Recording, Times};
+use crate::data::{Recording, Times};
 use crate::model::GreyBox;
 use crate::report::{EquationsPlan, fit_equations};
+use crate::tests::{assert_refused, channel};
 
 /// dx/dt = (gain scale u - loss x + push)/1, y = x, with the lines of some parameters.
 fn tank(parameters: &str) -> GreyBox {
@@ -48,7 +49,6 @@ fn log(loss: f64) -> Recording {
         y.push(level + 0.05 * 3.0_f64.sqrt() * noise.uniform());
         level += 0.8 * flow - loss * level + 0.01 * 3.0_f64.sqrt() * noise.uniform();
     }
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     Recording { channels: vec![channel("u", u), channel("y", y)], times: Times::Uniform(1.0) }
 }
 
@@ -133,8 +133,7 @@ fn refusals_say_what_to_do() {
     let open = format!("gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = 0\nloss = 0.1");
     let model = tank(&open);
     let says = |result: Result<Found, Error>, words: &str| {
-        let message = result.unwrap_err().to_string();
-        assert!(message.contains(words), "{message}");
+        assert_refused(result, words);
     };
     says(fitted(&tank(known), log(0.1)), "none of its parameters is unknown");
     let mut renamed = log(0.1);
@@ -179,7 +178,7 @@ fn a_trial_that_overflows_is_a_step_refused() {
         measurement = { y = 0.01 }";
     let model = GreyBox::from_toml(text).unwrap();
     let y: Vec<f64> = (0..30).map(|row| 0.5_f64.powi(row)).collect();
-    let channels = vec![Channel { name: "y".into(), values: y }];
+    let channels = vec![channel("y", y)];
     let report = fitted(&model, Recording { channels, times: Times::Uniform(1.0) }).unwrap();
     assert!((report.parameter(0).0 - 0.25).abs() < 1e-3, "{}", report.parameter(0).0);
 }
@@ -235,7 +234,6 @@ fn a_parameter_that_runs_away_is_undetermined() {
         y.push(x + 0.1 * noise.uniform());
         x = 0.5 * x - u[u.len() - 1];
     }
-    let channel = |name: &str, values| Channel { name: name.into(), values };
     let log = Recording { channels: vec![channel("u", u), channel("y", y)], times: Times::Uniform(1.0) };
     let model = GreyBox::from_toml(
         "sample_time = 1

@@ -14,8 +14,7 @@ fn log() -> Log {
         .map(|k| 2.0 * (f64::from(k) * 0.618_033_988_749_894_9).fract() - 1.0)
         .chain((0..=1000).map(|k| 0.99 * (f64::from(k) / 500.0 - 1.0)))
         .collect();
-    let y = u.iter().map(|u| g(*u)).collect();
-    let channel = |name: &str, values| Channel { name: name.into(), values };
+    let y: Vec<f64> = u.iter().map(|u| g(*u)).collect();
     Log::new(vec![channel("u", u), channel("y", y)], 1.0).unwrap()
 }
 

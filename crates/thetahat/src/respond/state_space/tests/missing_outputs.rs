@@ -362,7 +362,7 @@ fn a_lost_state_is_estimated_anew() -> Result<(), Error> {
     space.noise_covariance += &space.h * p * space.h.transpose();
     let rows = 400;
     let mut noise = Noise(3);
-    let mut values = || -> Vec<f64> { (0..rows).map(|_| noise.normal()).collect() };
+    let mut values = || noise.take_normal(rows);
     let u = [values(), values()];
     let mut y = [values(), values()];
     // A short hole is gone through, a long one is not, and a single output does not do after it.

@@ -4,8 +4,8 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
+use crate::lags::is_large;
 use crate::rls::{check_limits, pass_on_settings};
 use crate::stability::{is_stable, move_stably};
 use crate::ud::{copy, dot};
@@ -255,8 +255,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     ///
     /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (1 + nc) n + D numbers; each halving nc²/2 more.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.gradients.ncols())?;
+        self.lags.check_measured(&[output])?;
         Ok(self.step(&[], output, true))
     }
 
@@ -265,11 +264,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     ///
     /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.gradients.ncols())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
+        if !self.lags.take_applied(inputs)? {
             self.step(inputs, T::NAN, false);
         }
         Ok(())
@@ -280,8 +275,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
     /// that knows u(k-1) when y(k) arrives.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.gradients.ncols())?;
+        self.lags.check_row(inputs, &[output])?;
         Ok(self.step(inputs, output, false))
     }
 
@@ -365,8 +359,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         outputs: &mut [T],
     ) -> Result<(), Error> {
         workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, self.residual, future_inputs, outputs)
+        workspace.predict(self.estimator.parameters().as_slice(), self.residual, future_inputs, outputs)
     }
 
     /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one

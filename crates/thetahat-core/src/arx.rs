@@ -4,11 +4,7 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OVector};
 
-use crate::error::check_length;
-use crate::lags::is_infinite;
 use crate::rls::pass_on_settings;
-use crate::triangle::column;
-use crate::ud::dot;
 use crate::{
     Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real,
     RecursiveLeastSquares, RlsStart, Solution,
@@ -216,8 +212,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     ///
     /// 1.5 n² + 7 n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.size())?;
+        self.lags.check_measured(&[output])?;
         Ok(self.learn(&[], output, true))
     }
 
@@ -229,11 +224,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the orders;
     /// [`Error::Infinite`]; [`Error::TooLarge`], as for [`measured`](RecursiveArx::measured).
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.size())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
+        if !self.lags.take_applied(inputs)? {
             self.learn(inputs, T::NAN, false);
         }
         Ok(())
@@ -247,8 +238,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     ///
     /// Errors, after which nothing has changed, time included: those of the two, but for [`Error::InputFirst`].
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.size())?;
+        self.lags.check_row(inputs, &[output])?;
         Ok(self.learn(inputs, output, false))
     }
 
@@ -267,10 +257,6 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
             estimator.advance();
             Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
         })
-    }
-
-    fn size(&self) -> usize {
-        self.estimator.covariance().size().value()
     }
 
     /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
@@ -302,8 +288,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         outputs: &mut [T],
     ) -> Result<(), Error> {
         workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, T::zero(), future_inputs, outputs)
+        workspace.predict(self.estimator.parameters().as_slice(), T::zero(), future_inputs, outputs)
     }
 
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
@@ -406,68 +391,6 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     }
 
     pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
-}
-
-/// That no output is infinite, and that no sample is too large for a regressor of `size` such samples.
-pub(crate) fn check_samples<T: Real>(inputs: &[T], outputs: &[T], size: usize) -> Result<(), Error> {
-    if outputs.iter().any(is_infinite) {
-        return Err(Error::Infinite { argument: "output" });
-    }
-    for (argument, samples) in [("inputs", inputs), ("output", outputs)] {
-        if samples.iter().any(|&sample| is_large(sample, size)) {
-            return Err(Error::TooLarge { argument });
-        }
-    }
-    Ok(())
-}
-
-/// Whether a regressor of `size` such samples could be too large. NaN is not.
-pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
-    sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
-}
-
-/// Runs a model on from `lags`: its predictions become its outputs, those of several outputs one after the other, with
-/// a column of parameters for each. Of the residuals, if the model has them, the last one is known, and those to come
-/// are expected to be 0.
-pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
-    lags: &mut Lags<T, N, D>,
-    parameters: &[T],
-    mut residual: T,
-    future_inputs: &[T],
-    outputs: &mut [T],
-) -> Result<(), Error> {
-    let (inputs, each, n) = (lags.inputs(), lags.outputs().max(1), lags.size().value());
-    let steps = outputs.len() / each;
-    check_length("outputs", steps * each, outputs.len())?;
-    check_length("future_inputs", steps.saturating_mul(inputs), future_inputs.len())?;
-    if future_inputs.iter().any(is_infinite) {
-        return Err(Error::Infinite { argument: "future_inputs" });
-    }
-    let awaiting = lags.awaits_inputs();
-    let mut grown = false;
-    for (step, outputs) in outputs.chunks_exact_mut(each).enumerate() {
-        if grown {
-            outputs.fill(T::NAN);
-            continue;
-        }
-        let next = future_inputs.get(step * inputs..).unwrap_or_default();
-        if awaiting {
-            lags.complete(next);
-        }
-        lags.push(if awaiting { &[] } else { next }, residual);
-        if let Some(regressor) = lags.regressor() {
-            for (index, output) in outputs.iter_mut().enumerate() {
-                *output = dot(regressor.as_slice(), column(parameters, n, index));
-            }
-            grown = !outputs.iter().all(T::is_finite);
-        }
-        if grown || lags.regressor().is_none() {
-            outputs.fill(T::NAN);
-        }
-        lags.push_checked(outputs);
-        residual = T::zero();
-    }
-    if grown { Err(Error::Overflow) } else { Ok(()) }
 }
 
 #[cfg(feature = "serde")]

@@ -4,8 +4,8 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
+use crate::lags::is_large;
 use crate::rls::{check_limits, pass_on_settings};
 use crate::stability::{is_stable, move_stably};
 use crate::ud::{copy, dot};
@@ -208,8 +208,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     ///
     /// 1.5 n² + (9 + nf) n multiply-adds, n divisions, and moves of (1 + nf) n + D numbers; each halving nf²/2 more.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.past.ncols())?;
+        self.lags.check_measured(&[output])?;
         Ok(self.step(&[], output, true))
     }
 
@@ -218,11 +217,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     ///
     /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.past.ncols())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
+        if !self.lags.take_applied(inputs)? {
             self.step(inputs, T::NAN, false);
         }
         Ok(())
@@ -233,8 +228,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
     /// that knows u(k-1) when y(k) arrives.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.past.ncols())?;
+        self.lags.check_row(inputs, &[output])?;
         Ok(self.step(inputs, output, false))
     }
 
@@ -345,8 +339,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         outputs: &mut [T],
     ) -> Result<(), Error> {
         workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, T::zero(), future_inputs, outputs)
+        workspace.predict(self.estimator.parameters().as_slice(), T::zero(), future_inputs, outputs)
     }
 
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See

@@ -2,8 +2,6 @@
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, predict_ahead};
-use crate::error::check_length;
 use crate::rls::pass_on_settings;
 use crate::triangle::column;
 use crate::{
@@ -131,19 +129,14 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
     ///
     /// 1.5 n² + (6 + M) n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, outputs: &OVector<T, M>) -> Result<Innovation<T, OVector<T, M>>, Error> {
-        self.lags.check_delays()?;
-        self.check(&[], outputs.as_slice())?;
+        self.lags.check_measured(outputs.as_slice())?;
         Ok(self.step(&[], outputs, true))
     }
 
     /// u(k), one number for each input: what acts on the plant from now on. See
     /// [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.lags.size().value())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
+        if !self.lags.take_applied(inputs)? {
             let missing = self.estimator.parameters().shape_generic().1.vector(T::NAN);
             self.step(inputs, &missing, false);
         }
@@ -160,14 +153,8 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         outputs: &OVector<T, M>,
         inputs: &[T],
     ) -> Result<Innovation<T, OVector<T, M>>, Error> {
-        self.lags.check_inputs(inputs)?;
-        self.check(inputs, outputs.as_slice())?;
+        self.lags.check_row(inputs, outputs.as_slice())?;
         Ok(self.step(inputs, outputs, false))
-    }
-
-    fn check(&self, inputs: &[T], outputs: &[T]) -> Result<(), Error> {
-        check_length("outputs", self.lags.outputs(), outputs.len())?;
-        check_samples(inputs, outputs, self.lags.size().value())
     }
 
     /// One sample, checked.
@@ -221,7 +208,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         outputs: &mut [T],
     ) -> Result<(), Error> {
         workspace.copy_from(&self.lags)?;
-        predict_ahead(workspace, self.estimator.parameters().as_slice(), T::zero(), future_inputs, outputs)
+        workspace.predict(self.estimator.parameters().as_slice(), T::zero(), future_inputs, outputs)
     }
 
     /// Whether this type has the sizes for these orders and this many outputs, see

@@ -44,7 +44,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
         check_finite("residual", &[residual])?;
         let scratch = size.scratch::<T, 2, 0>();
         let armax = RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch };
-        armax.check_stable(armax.estimator.parameters().as_slice())?;
+        armax.check_stable(armax.estimator.parameters())?;
         Ok(armax)
     }
 }

@@ -51,7 +51,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
         }
         let scratch = size.scratch::<T, 2, 0>();
         let model = RecursiveOutputError { lags, estimator, past, nf, method, scratch };
-        model.check_stable(model.estimator.parameters().clone())?;
+        model.check_stable(model.estimator.parameters())?;
         Ok(model)
     }
 }

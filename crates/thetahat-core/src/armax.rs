@@ -1,14 +1,14 @@
 //! A recursive ARMAX estimator: extended least squares, and the prediction error method.
 
-use core::ops::RangeInclusive;
+use core::ops::{Range, RangeInclusive};
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
-use crate::rls::{check_limits, pass_on_settings};
-use crate::stability::{is_stable, move_stably};
-use crate::ud::{copy, dot};
+use crate::lags::{is_large, take_rows, tell_inputs, tell_predictions};
+use crate::rls::{check_limits, pass_on, pass_on_settings};
+use crate::stability::move_stably;
+use crate::ud::dot;
 use crate::{
     Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,
     RecursiveLeastSquares, RlsStart,
@@ -220,25 +220,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     }
 
     /// That C of these parameters is stable.
-    fn check_stable(&self, parameters: &[T]) -> Result<(), Error> {
-        let mut c = self.gradients.shape_generic().0.vector(T::zero());
-        let c = c.as_mut_slice().get_mut(..self.nc).unwrap_or_default();
-        copy(last(parameters, self.nc), c);
-        let range = "such that C(q) is stable";
-        is_stable(c).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
-    }
-
-    /// The same with a noise variance that is known from earlier samples. See
-    /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
-    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
-        self.set_noise_variance(variance, samples)?;
-        Ok(self)
-    }
-
-    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
-    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
-        self.set_dead_zone(width)?;
-        Ok(self)
+    fn check_stable(&self, parameters: &OVector<T, N>) -> Result<(), Error> {
+        let c = of_noise(parameters.len(), self.nc);
+        gradient::check_stable(parameters, c, "such that C(q) is stable")
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -255,46 +239,23 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     ///
     /// 1.5 n² + (9 + nc) n multiply-adds, n divisions, and moves of (1 + nc) n + D numbers; each halving nc²/2 more.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.gradients.ncols())?;
-        Ok(self.step(&[], output, true))
+        self.lags.check_measured(&[output])?;
+        Ok(self.take_sample(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a
-    /// missing sample.
-    ///
-    /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
-    pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.gradients.ncols())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
-            self.step(inputs, T::NAN, false);
-        }
-        Ok(())
-    }
-
-    /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
-    ///
-    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
-    /// that knows u(k-1) when y(k) arrives.
-    pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.gradients.ncols())?;
-        Ok(self.step(inputs, output, false))
-    }
+    take_rows!();
+    tell_predictions!(|this| this.residual);
+    tell_inputs!();
 
     /// One sample, checked.
-    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+    fn take_sample(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch } = self;
         let nc = *nc;
         lags.push(inputs, *residual);
         let size = gradients.shape_generic().0;
         let regressor = lags.regressor().map(OVector::as_slice);
         let innovation = size.with_scratch(scratch, |[gradient, work], []| {
-            let mut innovation =
-                Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady };
+            let mut innovation = Innovation::not_ready();
             let Some(regressor) = regressor else {
                 estimator.advance();
                 gradients.fill(T::zero());
@@ -303,7 +264,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
             };
             let c = match method {
                 ArmaxMethod::ExtendedLeastSquares => &[],
-                ArmaxMethod::PredictionError => last(estimator.parameters().as_slice(), nc),
+                ArmaxMethod::PredictionError => noise(estimator.parameters().as_slice(), nc),
             };
             let grown = !gradient::filter(gradient, regressor, c, gradients.as_slice());
             if output.is_finite() {
@@ -311,7 +272,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
                 let mut variance = [T::NAN];
                 let corrected =
                     estimator.correct(gradient, &[error], &mut variance, |parameters, direction, step| {
-                        let c = parameters.len().saturating_sub(nc)..parameters.len();
+                        let c = of_noise(parameters.len(), nc);
                         move_stably(parameters, direction, step, c, work)
                     });
                 // What is too large here is so by what came before: time must go on, or it would stay.
@@ -348,27 +309,6 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         innovation
     }
 
-    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
-    ///
-    /// As [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose arguments and errors it has. Residuals that
-    /// are known enter by C(q); those to come are expected to be 0.
-    pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
-        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
-    }
-
-    /// The same as [`predict`](RecursiveArmax::predict) in delay lines of the caller. As
-    /// [`RecursiveArx::predict_in`](crate::RecursiveArx::predict_in), whose errors it has.
-    pub fn predict_in(
-        &self,
-        workspace: &mut Lags<T, N, D>,
-        future_inputs: &[T],
-        outputs: &mut [T],
-    ) -> Result<(), Error> {
-        workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, self.residual, future_inputs, outputs)
-    }
-
     /// Takes the parameters of A, B and the constant back to their limits, one range for each, and returns whether one
     /// was out. See [`RecursiveLeastSquares::keep_within`], whose errors it has. C has no limits but its stability:
     /// where the nearest point has no stable C, each parameter is cut off by itself.
@@ -376,16 +316,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         let RecursiveArmax { estimator, gradients, nc, scratch, .. } = self;
         let size = gradients.shape_generic().0;
         check_limits(limits, size.value().saturating_sub(*nc))?;
+        let c = of_noise(size.value(), *nc);
         Ok(size.with_scratch(scratch, |[before, work], []| {
-            copy(estimator.parameters().as_slice(), before);
-            let out = estimator.project(limits);
-            let c = work.get_mut(..*nc).unwrap_or_default();
-            copy(last(estimator.parameters().as_slice(), *nc), c);
-            if out && !is_stable(c) {
-                estimator.put_parameters(before);
-                estimator.cut_off(limits);
-            }
-            out
+            gradient::keep_within(estimator, limits, c, before, work)
         }))
     }
 
@@ -394,31 +327,15 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
         Lags::<T, N, D>::fits_with(&orders.plant(), 1, orders.nc)
     }
 
-    /// The delay lines: the samples and residuals that the next samples are predicted from.
-    pub fn lags(&self) -> &Lags<T, N, D> {
-        &self.lags
-    }
-
     /// A(q): 1, a_1 … a_na.
     pub fn a(&self) -> impl Iterator<Item = T> + Clone + '_ {
         self.lags.output_coefficients(self.estimator.parameters().as_slice())
     }
 
-    /// B(q) of an input, counted from 0, so that the i-th number multiplies q⁻ⁱ: nk zeros, then b_0 … b_(nb-1). Empty
-    /// if the input has no coefficients; `None` if there is no such input.
-    pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
-        self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
-    }
-
-    /// The constant; `None` if the orders have none.
-    pub fn constant(&self) -> Option<T> {
-        self.lags.constant(self.estimator.parameters().as_slice())
-    }
-
     /// C(q): 1, c_1 … c_nc.
     pub fn c(&self) -> impl Iterator<Item = T> + Clone + '_ {
         core::iter::once(T::one())
-            .chain(last(self.estimator.parameters().as_slice(), self.nc).iter().copied())
+            .chain(noise(self.estimator.parameters().as_slice(), self.nc).iter().copied())
     }
 
     /// Tells that an unknown number of samples is missing here. See [`Lags::gap`].
@@ -434,26 +351,22 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArmax<T
     /// Errors: also [`Error::OutOfRange`] if C is not stable.
     pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
         self.estimator.check_parameters(&parameters)?;
-        self.check_stable(parameters.as_slice())?;
+        self.check_stable(&parameters)?;
         self.estimator.set_parameters(parameters)
     }
 
-    /// Sets the noise variance: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
-    pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
-        self.estimator.set_noise_variance(variance, samples)
-    }
-
-    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
-    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
-        self.estimator.set_dead_zone(width)
-    }
-
+    pass_on!(noise_variance, dead_zone);
     pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
 }
 
-/// The last `count` numbers.
-fn last<T>(values: &[T], count: usize) -> &[T] {
-    values.get(values.len().saturating_sub(count)..).unwrap_or_default()
+/// Where C stands in this many parameters.
+fn of_noise(parameters: usize, nc: usize) -> Range<usize> {
+    parameters.saturating_sub(nc)..parameters
+}
+
+/// C of these parameters, without its 1.
+fn noise<T>(parameters: &[T], nc: usize) -> &[T] {
+    parameters.get(of_noise(parameters.len(), nc)).unwrap_or_default()
 }
 
 #[cfg(feature = "serde")]

@@ -4,14 +4,10 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OVector};
 
-use crate::error::check_length;
-use crate::lags::is_infinite;
-use crate::rls::pass_on_settings;
-use crate::triangle::column;
-use crate::ud::dot;
+use crate::lags::{take_rows, tell_inputs, tell_predictions};
+use crate::rls::{pass_on, pass_on_settings};
 use crate::{
-    Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real,
-    RecursiveLeastSquares, RlsStart, Solution,
+    ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real, RecursiveLeastSquares,
 };
 
 /// An ARX model, estimated while the plant runs.
@@ -177,36 +173,11 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Self::new(&O::ORDERS, output_scale, input_scales, forgetting)
     }
 
-    /// The same with another start. See [`RecursiveLeastSquares::with_start`].
-    ///
-    /// Errors: none that can occur.
-    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_start(start)?, ..self })
-    }
-
-    /// The same started from a batch solution. See [`RecursiveLeastSquares::with_solution`], whose errors it has.
-    pub fn with_solution(self, solution: &Solution<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveArx { estimator: self.estimator.with_solution(solution)?, ..self })
-    }
-
-    /// The same with a noise variance that is known from earlier samples. See
-    /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
-    pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
-        self.set_noise_variance(variance, samples)?;
-        Ok(self)
-    }
-
-    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has.
-    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
-        self.set_dead_zone(width)?;
-        Ok(self)
-    }
-
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
     /// [`applied`](RecursiveArx::applied) before. NaN is a missing sample.
     ///
     /// The innovation is that of [`RecursiveLeastSquares::update`]. Its action is
-    /// [`NotReady`](Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet; and
+    /// [`NotReady`](crate::Action::NotReady) while a missing sample sits in a tap, or the lines are not filled yet; and
     /// where numbers that are accepted one by one would overflow together with P or the parameters: nothing is
     /// corrected then, but time goes on, so that a large sample leaves the taps again.
     ///
@@ -216,44 +187,16 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
     ///
     /// 1.5 n² + 7 n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.size())?;
-        Ok(self.learn(&[], output, true))
+        self.lags.check_measured(&[output])?;
+        Ok(self.take_sample(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the plant
-    /// got it (so after all limits). NaN is a missing sample.
-    ///
-    /// If no measurement has come since the inputs before, that one is missing, and time goes on first.
-    ///
-    /// Errors, after which nothing has changed: [`Error::Length`] if the number of inputs is not that of the orders;
-    /// [`Error::Infinite`]; [`Error::TooLarge`], as for [`measured`](RecursiveArx::measured).
-    pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.size())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
-            self.learn(inputs, T::NAN, false);
-        }
-        Ok(())
-    }
-
-    /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
-    ///
-    /// With every nk at least 1 it is [`measured`](RecursiveArx::measured) and then [`applied`](RecursiveArx::applied),
-    /// to the bit: u(k) has no part in the innovation of y(k). It is not the call for a controller that knows u(k-1)
-    /// when y(k) arrives: to take that as u(k) would make the model a sample late.
-    ///
-    /// Errors, after which nothing has changed, time included: those of the two, but for [`Error::InputFirst`].
-    pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.size())?;
-        Ok(self.learn(inputs, output, false))
-    }
+    take_rows!();
+    tell_predictions!(|_| T::zero());
+    tell_inputs!();
 
     /// One sample, checked.
-    fn learn(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+    fn take_sample(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveArx { lags, estimator } = self;
         // What is too large here is so by what came before: time must go on, or it would stay.
         let taken =
@@ -265,45 +208,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         }
         taken.unwrap_or_else(|| {
             estimator.advance();
-            Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
+            Innovation::not_ready()
         })
-    }
-
-    fn size(&self) -> usize {
-        self.estimator.covariance().size().value()
-    }
-
-    /// The outputs to come, ŷ(k+1), ŷ(k+2), …, as many as `outputs` holds, y(k) being the latest one.
-    ///
-    /// `future_inputs` are those to come, each with one number for every input, and as many as outputs. Which is the
-    /// first follows from the latest call: after [`measured`](RecursiveArx::measured) of y(k) it is u(k), which is
-    /// still to be chosen; after [`applied`](RecursiveArx::applied) or [`log_row`](RecursiveArx::log_row) of u(k) it is
-    /// u(k+1). (With nk = 1 the last one acts on nothing then, but is there.) Predicted outputs take the place of
-    /// measured ones. An output that depends on a missing sample is NaN.
-    ///
-    /// The state of the estimator does not change. With `Dyn` the delay lines are cloned. n multiply-adds and moves
-    /// a step.
-    ///
-    /// Errors: [`Error::Length`] if the number of inputs is not that of the outputs times that of the inputs of the
-    /// model; [`Error::Infinite`]; both leave `outputs` as they were. [`Error::Overflow`] if an unstable model grows
-    /// out of `T`: the outputs before that are written, the others are NaN.
-    pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
-        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
-    }
-
-    /// The same as [`predict`](RecursiveArx::predict) in delay lines of the caller, such as a clone of
-    /// [`lags`](RecursiveArx::lags), whose samples are lost: with `Dyn` it does not allocate.
-    ///
-    /// Errors: those of `predict`; [`Error::Length`] (only with `Dyn`) if the lines have another size.
-    pub fn predict_in(
-        &self,
-        workspace: &mut Lags<T, N, D>,
-        future_inputs: &[T],
-        outputs: &mut [T],
-    ) -> Result<(), Error> {
-        workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, T::zero(), future_inputs, outputs)
     }
 
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
@@ -364,25 +270,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         Lags::<T, N, D>::fits(orders)
     }
 
-    /// The delay lines: the samples that the next ones are predicted from.
-    pub fn lags(&self) -> &Lags<T, N, D> {
-        &self.lags
-    }
-
     /// A(q): 1, a_1 … a_na.
     pub fn a(&self) -> impl Iterator<Item = T> + Clone + '_ {
         self.lags.output_coefficients(self.estimator.parameters().as_slice())
-    }
-
-    /// B(q) of an input, counted from 0, so that the i-th number multiplies q⁻ⁱ: nk zeros, then b_0 … b_(nb-1). Empty
-    /// if the input has no coefficients; `None` if there is no such input.
-    pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
-        self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
-    }
-
-    /// The constant; `None` if the orders have none.
-    pub fn constant(&self) -> Option<T> {
-        self.lags.constant(self.estimator.parameters().as_slice())
     }
 
     /// Tells that an unknown number of samples is missing here. See [`Lags::gap`].
@@ -395,79 +285,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveArx<T, 
         self.estimator.set_parameters(parameters)
     }
 
-    /// Sets the noise variance: see [`RecursiveLeastSquares::set_noise_variance`], whose errors it has.
-    pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), Error> {
-        self.estimator.set_noise_variance(variance, samples)
-    }
-
-    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
-    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
-        self.estimator.set_dead_zone(width)
-    }
-
+    pass_on!(start, solution, noise_variance, dead_zone);
     pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
-}
-
-/// That no output is infinite, and that no sample is too large for a regressor of `size` such samples.
-pub(crate) fn check_samples<T: Real>(inputs: &[T], outputs: &[T], size: usize) -> Result<(), Error> {
-    if outputs.iter().any(is_infinite) {
-        return Err(Error::Infinite { argument: "output" });
-    }
-    for (argument, samples) in [("inputs", inputs), ("output", outputs)] {
-        if samples.iter().any(|&sample| is_large(sample, size)) {
-            return Err(Error::TooLarge { argument });
-        }
-    }
-    Ok(())
-}
-
-/// Whether a regressor of `size` such samples could be too large. NaN is not.
-pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
-    sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
-}
-
-/// Runs a model on from `lags`: its predictions become its outputs, those of several outputs one after the other, with
-/// a column of parameters for each. Of the residuals, if the model has them, the last one is known, and those to come
-/// are expected to be 0.
-pub(crate) fn predict_ahead<T: Real, N: Dimension, D: Dimension>(
-    lags: &mut Lags<T, N, D>,
-    parameters: &[T],
-    mut residual: T,
-    future_inputs: &[T],
-    outputs: &mut [T],
-) -> Result<(), Error> {
-    let (inputs, each, n) = (lags.inputs(), lags.outputs().max(1), lags.size().value());
-    let steps = outputs.len() / each;
-    check_length("outputs", steps * each, outputs.len())?;
-    check_length("future_inputs", steps.saturating_mul(inputs), future_inputs.len())?;
-    if future_inputs.iter().any(is_infinite) {
-        return Err(Error::Infinite { argument: "future_inputs" });
-    }
-    let awaiting = lags.awaits_inputs();
-    let mut grown = false;
-    for (step, outputs) in outputs.chunks_exact_mut(each).enumerate() {
-        if grown {
-            outputs.fill(T::NAN);
-            continue;
-        }
-        let next = future_inputs.get(step * inputs..).unwrap_or_default();
-        if awaiting {
-            lags.complete(next);
-        }
-        lags.push(if awaiting { &[] } else { next }, residual);
-        if let Some(regressor) = lags.regressor() {
-            for (index, output) in outputs.iter_mut().enumerate() {
-                *output = dot(regressor.as_slice(), column(parameters, n, index));
-            }
-            grown = !outputs.iter().all(T::is_finite);
-        }
-        if grown || lags.regressor().is_none() {
-            outputs.fill(T::NAN);
-        }
-        lags.push_checked(outputs);
-        residual = T::zero();
-    }
-    if grown { Err(Error::Overflow) } else { Ok(()) }
 }
 
 #[cfg(feature = "serde")]

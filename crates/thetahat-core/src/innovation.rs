@@ -137,6 +137,11 @@ impl<T, E> Innovation<T, E> {
 }
 
 impl<T: Real> Innovation<T> {
+    /// Of a sample that could not be predicted.
+    pub(crate) fn not_ready() -> Self {
+        Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
+    }
+
     /// ln p(y): the log-likelihood of this measurement, given all before it, if the innovation is Gaussian.
     ///
     /// ```text

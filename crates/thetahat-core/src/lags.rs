@@ -1,6 +1,7 @@
 //! Tapped delay lines: recent inputs and outputs make the regressor of an ARX model.
 
 mod orders;
+mod samples;
 
 use nalgebra::{Const, OVector};
 
@@ -8,6 +9,7 @@ use crate::error::check_length;
 use crate::{Dimension, Error, Real, ud};
 
 pub use orders::{ArxOrders, ConstantOrders, InputOrders};
+pub(crate) use samples::{is_large, take_rows, tell_inputs, tell_predictions};
 
 /// The delay line of one input that has coefficients, or of what else is in φ after the outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,8 @@
 
 use nalgebra::{Const, OVector};
 
-use crate::arx::is_large;
 use crate::error::check_length;
-use crate::lags::is_infinite;
+use crate::lags::{is_infinite, is_large};
 use crate::{ArxOrders, Basis, Dimension, Error, Lags, Real};
 
 /// How a signal is made about 1 in size: z = (x - offset)/scale.

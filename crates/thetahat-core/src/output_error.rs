@@ -4,10 +4,10 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, is_large, predict_ahead};
 use crate::gradient;
-use crate::rls::{check_limits, pass_on_settings};
-use crate::stability::{is_stable, move_stably};
+use crate::lags::{is_large, take_rows, tell_inputs, tell_predictions};
+use crate::rls::{check_limits, pass_on, pass_on_settings};
+use crate::stability::move_stably;
 use crate::ud::{copy, dot};
 use crate::{
     Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Outliers, Real,
@@ -182,17 +182,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     }
 
     /// That F, the first of these parameters, is stable.
-    fn check_stable(&self, mut f: OVector<T, N>) -> Result<(), Error> {
-        let f = f.as_mut_slice().get_mut(..self.nf).unwrap_or_default();
-        let range = "such that F(q) is stable";
-        is_stable(f).then_some(()).ok_or(Error::OutOfRange { argument: "parameters", range })
-    }
-
-    /// The same with a dead zone. See [`RecursiveLeastSquares::with_dead_zone`], whose errors it has. The error that is
-    /// compared with it is that of the method.
-    pub fn with_dead_zone(mut self, width: T) -> Result<Self, Error> {
-        self.set_dead_zone(width)?;
-        Ok(self)
+    fn check_stable(&self, parameters: &OVector<T, N>) -> Result<(), Error> {
+        gradient::check_stable(parameters, 0..self.nf, "such that F(q) is stable")
     }
 
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
@@ -208,38 +199,16 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     ///
     /// 1.5 n² + (9 + nf) n multiply-adds, n divisions, and moves of (1 + nf) n + D numbers; each halving nf²/2 more.
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
-        self.lags.check_delays()?;
-        check_samples(&[], &[output], self.past.ncols())?;
-        Ok(self.step(&[], output, true))
+        self.lags.check_measured(&[output])?;
+        Ok(self.take_sample(&[], output, true))
     }
 
-    /// u(k), one number for each input: what acts on the plant from now on, until the next measurement. NaN is a
-    /// missing sample.
-    ///
-    /// As [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
-    pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.past.ncols())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
-            self.step(inputs, T::NAN, false);
-        }
-        Ok(())
-    }
-
-    /// One row of a log: y(k) and u(k), recorded at the same instant k. NaN is a missing sample.
-    ///
-    /// As [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has: not the call for a controller
-    /// that knows u(k-1) when y(k) arrives.
-    pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[output], self.past.ncols())?;
-        Ok(self.step(inputs, output, false))
-    }
+    take_rows!();
+    tell_predictions!(|_| T::zero());
+    tell_inputs!();
 
     /// One sample, checked.
-    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+    fn take_sample(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         self.lags.push(inputs, T::NAN);
         let learnt = self.learn(output);
         let simulated = match learnt {
@@ -259,10 +228,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         }
         self.lags.push_checked(&[simulated]);
         self.lags.await_inputs(inputs_follow);
-        learnt.map_or(
-            Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady },
-            |(innovation, _)| innovation,
-        )
+        learnt.map_or(Innovation::not_ready(), |(innovation, _)| innovation)
     }
 
     /// Learns from y(k), if φ(k) is there; returns the innovation and x̂(k), or `None` where numbers are missing or too
@@ -329,26 +295,6 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         }
     }
 
-    /// The outputs to come, x̂(k+1), x̂(k+2), …, as many as `outputs` holds, y(k) being the latest one.
-    ///
-    /// As [`RecursiveArx::predict`](crate::RecursiveArx::predict), whose arguments and errors it has.
-    pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
-        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
-    }
-
-    /// The same as [`predict`](RecursiveOutputError::predict) in delay lines of the caller. As
-    /// [`RecursiveArx::predict_in`](crate::RecursiveArx::predict_in), whose errors it has.
-    pub fn predict_in(
-        &self,
-        workspace: &mut Lags<T, N, D>,
-        future_inputs: &[T],
-        outputs: &mut [T],
-    ) -> Result<(), Error> {
-        workspace.copy_from(&self.lags)?;
-        let parameters = self.estimator.parameters().as_slice();
-        predict_ahead(workspace, parameters, T::zero(), future_inputs, outputs)
-    }
-
     /// Takes the parameters back to their limits, one range for each, and returns whether one was out. See
     /// [`RecursiveLeastSquares::keep_within`], whose errors it has. Where the nearest point has no stable F, each
     /// parameter is cut off by itself, and F stays as it is if that does not help.
@@ -357,18 +303,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         let size = past.shape_generic().0;
         check_limits(limits, size.value())?;
         Ok(size.with_scratch(scratch, |[before, work], []| {
-            copy(estimator.parameters().as_slice(), before);
-            let out = estimator.project(limits);
-            if out && !has_stable(estimator.parameters().as_slice(), *nf, work) {
-                estimator.put_parameters(before);
-                estimator.cut_off(limits);
-                if !has_stable(estimator.parameters().as_slice(), *nf, work) {
-                    let rest = estimator.parameters().as_slice().get(*nf..).unwrap_or_default();
-                    copy(rest, before.get_mut(*nf..).unwrap_or_default());
-                    estimator.put_parameters(before);
-                }
-            }
-            out
+            gradient::keep_within(estimator, limits, 0..*nf, before, work)
         }))
     }
 
@@ -377,25 +312,9 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         Lags::<T, N, D>::fits(orders)
     }
 
-    /// The delay lines: the samples and the model's outputs that the next ones are computed from.
-    pub fn lags(&self) -> &Lags<T, N, D> {
-        &self.lags
-    }
-
     /// F(q): 1, f_1 … f_nf.
     pub fn f(&self) -> impl Iterator<Item = T> + Clone + '_ {
         self.lags.output_coefficients(self.estimator.parameters().as_slice())
-    }
-
-    /// B(q) of an input, counted from 0, so that the i-th number multiplies q⁻ⁱ: nk zeros, then b_0 … b_(nb-1). Empty
-    /// if the input has no coefficients; `None` if there is no such input.
-    pub fn b(&self, input: usize) -> Option<impl Iterator<Item = T> + Clone + '_> {
-        self.lags.input_coefficients(self.estimator.parameters().as_slice(), input)
-    }
-
-    /// The constant; `None` if the orders have none.
-    pub fn constant(&self) -> Option<T> {
-        self.lags.constant(self.estimator.parameters().as_slice())
     }
 
     /// Tells that an unknown number of samples is missing here. See [`Lags::gap`].
@@ -409,13 +328,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
     /// Errors: also [`Error::OutOfRange`] if F is not stable.
     pub fn set_parameters(&mut self, parameters: OVector<T, N>) -> Result<(), Error> {
         self.estimator.check_parameters(&parameters)?;
-        self.check_stable(parameters.clone())?;
+        self.check_stable(&parameters)?;
         self.estimator.set_parameters(parameters)
-    }
-
-    /// Sets the dead zone: see [`RecursiveLeastSquares::set_dead_zone`], whose errors it has.
-    pub fn set_dead_zone(&mut self, width: T) -> Result<(), Error> {
-        self.estimator.set_dead_zone(width)
     }
 
     /// That the variance of the noise is known, which a rule for outliers compares with.
@@ -425,14 +339,8 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> RecursiveOutputE
         known.then_some(()).ok_or(Error::OutOfRange { argument: "outliers", range })
     }
 
+    pass_on!(dead_zone);
     pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>, Self::knows_noise);
-}
-
-/// Whether the first `nf` parameters make a stable polynomial.
-fn has_stable<T: Real>(parameters: &[T], nf: usize, work: &mut [T]) -> bool {
-    let f = work.get_mut(..nf).unwrap_or_default();
-    copy(parameters, f);
-    is_stable(f)
 }
 
 #[cfg(feature = "serde")]

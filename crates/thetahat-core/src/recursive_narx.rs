@@ -4,10 +4,10 @@ use core::ops::RangeInclusive;
 
 use nalgebra::{Const, OVector};
 
-use crate::rls::pass_on_settings;
+use crate::rls::{pass_on, pass_on_settings};
 use crate::{
-    Action, ArxOrders, Basis, Dimension, Error, Forgetting, Innovation, Lags, NonlinearArx, Real,
-    RecursiveLeastSquares, RlsStart, Scaling, Solution,
+    ArxOrders, Basis, Dimension, Error, Forgetting, Innovation, Lags, NonlinearArx, Real,
+    RecursiveLeastSquares, Scaling,
 };
 
 /// A nonlinear ARX model, estimated while the plant runs.
@@ -107,19 +107,6 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         Ok(RecursiveNarx { model, estimator, functions: size.vector(T::NAN) })
     }
 
-    /// The same with another start. See [`RecursiveLeastSquares::with_start`].
-    ///
-    /// Errors: none that can occur.
-    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
-        Ok(RecursiveNarx { estimator: self.estimator.with_start(start)?, ..self })
-    }
-
-    /// The same started from a batch solution on the functions. See [`RecursiveLeastSquares::with_solution`], whose
-    /// errors it has.
-    pub fn with_solution(self, solution: &Solution<T, N>) -> Result<Self, Error> {
-        Ok(RecursiveNarx { estimator: self.estimator.with_solution(solution)?, ..self })
-    }
-
     /// The same with a noise variance, in squared units of the output, that is known from earlier samples. See
     /// [`RecursiveLeastSquares::with_noise_variance`], whose errors it has.
     pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, Error> {
@@ -141,7 +128,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
     pub fn measured(&mut self, output: T) -> Result<Innovation<T>, Error> {
         self.model.lags.check_delays()?;
         self.model.check_samples(&[], output)?;
-        Ok(self.step(&[], output, true))
+        Ok(self.take_sample(&[], output, true))
     }
 
     /// u(k): what acts on the plant from now on. See [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose
@@ -159,11 +146,11 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
     /// [`RecursiveArx::log_row`](crate::RecursiveArx::log_row), whose errors it has.
     pub fn log_row(&mut self, output: T, inputs: &[T]) -> Result<Innovation<T>, Error> {
         self.model.check_row(output, inputs)?;
-        Ok(self.step(inputs, output, false))
+        Ok(self.take_sample(inputs, output, false))
     }
 
     /// One sample, checked.
-    fn step(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
+    fn take_sample(&mut self, inputs: &[T], output: T, inputs_follow: bool) -> Innovation<T> {
         let RecursiveNarx { model, estimator, functions } = self;
         let functions = functions.as_mut_slice();
         let scale = model.output.scale;
@@ -181,7 +168,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
             return Innovation { error, variance, ..innovation };
         }
         estimator.advance();
-        Innovation { error: T::NAN, variance: T::NAN, nis: T::zero(), action: Action::NotReady }
+        Innovation::not_ready()
     }
 
     /// The outputs to come, by the parameters of now. See [`NonlinearArx::predict`], whose errors it has.
@@ -239,6 +226,7 @@ impl<T: Real, B: Basis<T>, Z: Dimension, N: Dimension + Dimension<Const<1>>, D: 
         &self.model
     }
 
+    pass_on!(start, solution);
     pass_on_settings!(OVector<T, N>, RecursiveLeastSquares<T, N>);
 }
 

@@ -23,7 +23,7 @@ use after::After;
 pub(crate) use limits::check_limits;
 use residuals::Residuals;
 pub(crate) use sample::is_small;
-pub(crate) use settings::pass_on_settings;
+pub(crate) use settings::{pass_on, pass_on_settings};
 
 /// Recursive least squares: a regressor and an output in each sample, the parameters out at any time.
 ///

@@ -4,7 +4,8 @@
 //! NaN nor infinity (JSON has not), these are the words "NaN", "inf" and "-inf".
 //!
 //! Each type has a `Snapshot` of its own, in a file beside it: its fields without what follows from them, a
-//! [`SnapshotVersion`] in front. What is read is made of it by the constructor, or by the same checks.
+//! [`SnapshotVersion`] in front. `snapshot!` makes it of a list of them. What is read is made of it by the constructor,
+//! or by the same checks.
 //!
 //! nalgebra's own implementations would ask for bounds that [`Dimension`] hides; the functions here ask for none.
 
@@ -52,6 +53,35 @@ impl<'de> Deserialize<'de> for SnapshotVersion {
         }
     }
 }
+
+/// The snapshot of a type: its version, then these fields of the type, each as its attribute says. After an arrow stands
+/// of which field another value is made, and how.
+macro_rules! snapshot {
+    (
+        $snapshot:ident<$($argument:ident),+> of $type:ident<$($of:ident),+> where [$($bounds:tt)+] {
+            $($(#[$how:meta])* $field:ident: $kind:ty $(=> $source:ident, $make:expr)?;)+
+        }
+    ) => {
+        #[derive(serde::Serialize, serde::Deserialize)]
+        #[serde(bound = "")]
+        pub(super) struct $snapshot<$($bounds)+> {
+            version: crate::SnapshotVersion,
+            $($(#[$how])* $field: $kind,)+
+        }
+
+        impl<$($bounds)+> From<$type<$($of),+>> for $snapshot<$($argument),+> {
+            fn from(of: $type<$($of),+>) -> Self {
+                $snapshot {
+                    version: crate::SnapshotVersion,
+                    $($field: crate::snapshot::snapshot!(@ of $field $($source, $make)?),)+
+                }
+            }
+        }
+    };
+    (@ $of:ident $field:ident) => { $of.$field };
+    (@ $of:ident $field:ident $source:ident, $make:expr) => { $make(&$of.$source) };
+}
+pub(crate) use snapshot;
 
 /// What stands in a vector or matrix.
 pub(crate) trait Entry: Scalar + Copy {

@@ -2,13 +2,12 @@
 
 use nalgebra::{Const, OMatrix, OVector};
 
-use crate::arx::{check_samples, predict_ahead};
-use crate::error::check_length;
-use crate::rls::pass_on_settings;
+use crate::lags::tell_predictions;
+use crate::rls::{pass_on, pass_on_settings};
 use crate::triangle::column;
 use crate::{
     Action, ArxOrders, ConstantOrders, Dimension, Error, Forgetting, Innovation, Lags, Real,
-    RecursiveLeastSquares, RlsStart,
+    RecursiveLeastSquares,
 };
 
 /// An ARX model with several outputs, estimated while the plant runs.
@@ -112,13 +111,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         Self::new(&O::ORDERS, output_scales, input_scales, forgetting)
     }
 
-    /// The same with another start. See [`RecursiveLeastSquares::with_start`].
-    ///
-    /// Errors: none that can occur.
-    pub fn with_start(self, start: RlsStart) -> Result<Self, Error> {
-        Ok(RecursiveVectorArx { estimator: self.estimator.with_start(start)?, ..self })
-    }
-
     /// y(k) arrives: time goes on to k, and the model learns from y(k) and the inputs that were
     /// [`applied`](RecursiveVectorArx::applied) before. NaN is a missing sample of an output.
     ///
@@ -131,21 +123,16 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
     ///
     /// 1.5 n² + (6 + M) n multiply-adds, n divisions, and one move of n + D numbers.
     pub fn measured(&mut self, outputs: &OVector<T, M>) -> Result<Innovation<T, OVector<T, M>>, Error> {
-        self.lags.check_delays()?;
-        self.check(&[], outputs.as_slice())?;
-        Ok(self.step(&[], outputs, true))
+        self.lags.check_measured(outputs.as_slice())?;
+        Ok(self.take_sample(&[], outputs, true))
     }
 
     /// u(k), one number for each input: what acts on the plant from now on. See
     /// [`RecursiveArx::applied`](crate::RecursiveArx::applied), whose errors it has.
     pub fn applied(&mut self, inputs: &[T]) -> Result<(), Error> {
-        self.lags.check_inputs(inputs)?;
-        check_samples(inputs, &[], self.lags.size().value())?;
-        if self.lags.awaits_inputs() {
-            self.lags.complete(inputs);
-        } else {
+        if !self.lags.take_applied(inputs)? {
             let missing = self.estimator.parameters().shape_generic().1.vector(T::NAN);
-            self.step(inputs, &missing, false);
+            self.take_sample(inputs, &missing, false);
         }
         Ok(())
     }
@@ -160,18 +147,14 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         outputs: &OVector<T, M>,
         inputs: &[T],
     ) -> Result<Innovation<T, OVector<T, M>>, Error> {
-        self.lags.check_inputs(inputs)?;
-        self.check(inputs, outputs.as_slice())?;
-        Ok(self.step(inputs, outputs, false))
+        self.lags.check_row(inputs, outputs.as_slice())?;
+        Ok(self.take_sample(inputs, outputs, false))
     }
 
-    fn check(&self, inputs: &[T], outputs: &[T]) -> Result<(), Error> {
-        check_length("outputs", self.lags.outputs(), outputs.len())?;
-        check_samples(inputs, outputs, self.lags.size().value())
-    }
+    tell_predictions!(|_| T::zero());
 
     /// One sample, checked.
-    fn step(
+    fn take_sample(
         &mut self,
         inputs: &[T],
         outputs: &OVector<T, M>,
@@ -196,34 +179,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         })
     }
 
-    /// The outputs to come, ŷ(k+1), then ŷ(k+2), …, each with a number for every output, as many as `outputs` holds.
-    ///
-    /// `future_inputs` are those to come, and as many samples; which is the first follows from the latest call, as in
-    /// [`RecursiveArx::predict`](crate::RecursiveArx::predict). Predicted outputs take the place of measured ones. A
-    /// sample that depends on a missing one is NaN. The state of the estimator does not change. With `Dyn` the delay
-    /// lines are cloned. n M multiply-adds and n moves a step.
-    ///
-    /// Errors: [`Error::Length`] if there are no whole samples, or not as many inputs; [`Error::Infinite`]; both leave
-    /// `outputs` as they were. [`Error::Overflow`] if an unstable model grows out of `T`: the samples before that are
-    /// written, the others are NaN.
-    pub fn predict(&self, future_inputs: &[T], outputs: &mut [T]) -> Result<(), Error> {
-        self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
-    }
-
-    /// The same as [`predict`](RecursiveVectorArx::predict) in delay lines of the caller, such as a clone of
-    /// [`lags`](RecursiveVectorArx::lags), whose samples are lost: with `Dyn` it does not allocate.
-    ///
-    /// Errors: those of `predict`; [`Error::Length`] (only with `Dyn`) if the lines have another size.
-    pub fn predict_in(
-        &self,
-        workspace: &mut Lags<T, N, D>,
-        future_inputs: &[T],
-        outputs: &mut [T],
-    ) -> Result<(), Error> {
-        workspace.copy_from(&self.lags)?;
-        predict_ahead(workspace, self.estimator.parameters().as_slice(), T::zero(), future_inputs, outputs)
-    }
-
     /// Whether this type has the sizes for these orders and this many outputs, see
     /// [`RecursiveArx::fits`](crate::RecursiveArx::fits).
     ///
@@ -241,11 +196,6 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
             None => true,
         };
         exact && Lags::<T, N, D>::fits_with(orders, outputs, 0)
-    }
-
-    /// The delay lines: the samples that the next ones are predicted from.
-    pub fn lags(&self) -> &Lags<T, N, D> {
-        &self.lags
     }
 
     /// A(q) in a row and a column, counted from 0: what multiplies the output of the column in the equation of that of
@@ -285,6 +235,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> Recursive
         self.estimator.set_parameters(parameters)
     }
 
+    pass_on!(start);
     pass_on_settings!(OMatrix<T, N, M>, RecursiveLeastSquares<T, N, M>);
 }
 

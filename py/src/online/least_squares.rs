@@ -21,6 +21,16 @@ pub(crate) enum Engine {
     Many(Stepper<f64, Dyn, Dyn>),
 }
 
+/// The same with an estimator of one output or of several.
+macro_rules! either {
+    ($engine:expr, $estimator:ident => $what:expr) => {
+        match $engine {
+            Engine::One($estimator) => $what,
+            Engine::Many($estimator) => $what,
+        }
+    };
+}
+
 impl<N: Dimension + Dimension<M>, M: Dimension> Around<N, M> for Stepper<f64, N, M> {
     fn estimator(&self) -> &Stepper<f64, N, M> {
         self
@@ -98,10 +108,7 @@ pub(crate) struct RecursiveLeastSquares {
 
 impl RecursiveLeastSquares {
     pub(crate) fn of(engine: Engine) -> Self {
-        let n = match &engine {
-            Engine::One(estimator) => estimator.parameters().nrows(),
-            Engine::Many(estimator) => estimator.parameters().nrows(),
-        };
+        let n = either!(&engine, estimator => estimator.parameters().nrows());
         RecursiveLeastSquares { engine, regressor: DVector::zeros(n) }
     }
 }
@@ -358,46 +365,31 @@ impl RecursiveLeastSquares {
 
     /// Take one sample without a measurement: only the random walk takes note of it.
     fn advance(&mut self) {
-        match &mut self.engine {
-            Engine::One(estimator) => estimator.advance(),
-            Engine::Many(estimator) => estimator.advance(),
-        }
+        either!(&mut self.engine, estimator => estimator.advance())
     }
 
     /// The parameters, shape (n,), or (n, outputs) for several outputs.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        match &self.engine {
-            Engine::One(estimator) => recursive::parameters(py, estimator),
-            Engine::Many(estimator) => recursive::parameters(py, estimator),
-        }
+        either!(&self.engine, estimator => recursive::parameters(py, estimator))
     }
 
     /// P, shape (n, n): the covariance of the parameters in units of the noise variance.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        match &self.engine {
-            Engine::One(estimator) => recursive::covariance(py, estimator),
-            Engine::Many(estimator) => recursive::covariance(py, estimator),
-        }
+        either!(&self.engine, estimator => recursive::covariance(py, estimator))
     }
 
     /// The covariance of the parameters, shape (n, n), or (outputs, n, n); None until the noise variance is known.
     #[getter]
     fn parameter_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        match &self.engine {
-            Engine::One(estimator) => recursive::parameter_covariance(py, estimator),
-            Engine::Many(estimator) => recursive::parameter_covariance(py, estimator),
-        }
+        either!(&self.engine, estimator => recursive::parameter_covariance(py, estimator))
     }
 
     /// The standard errors, of the shape of the parameters; None until the noise variance is known.
     #[getter]
     fn standard_errors<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        match &self.engine {
-            Engine::One(estimator) => recursive::standard_errors(py, estimator),
-            Engine::Many(estimator) => recursive::standard_errors(py, estimator),
-        }
+        either!(&self.engine, estimator => recursive::standard_errors(py, estimator))
     }
 
     /// The variance of the noise, a float, or an array of shape (outputs,); None until enough samples are in.
@@ -416,46 +408,31 @@ impl RecursiveLeastSquares {
     /// How much the samples in the memory tell of the parameter they tell least of, 0 to 1.
     #[getter]
     fn excitation(&self) -> f64 {
-        match &self.engine {
-            Engine::One(estimator) => estimator.excitation(),
-            Engine::Many(estimator) => estimator.excitation(),
-        }
+        either!(&self.engine, estimator => estimator.excitation())
     }
 
     /// The forgetting policy.
     #[getter]
     fn forgetting(&self) -> Forgetting {
-        let policy = match &self.engine {
-            Engine::One(estimator) => estimator.forgetting(),
-            Engine::Many(estimator) => estimator.forgetting(),
-        };
+        let policy = either!(&self.engine, estimator => estimator.forgetting());
         Forgetting { policy }
     }
 
     /// How many of the latest samples are outliers by the rule for them, since the last one that is not.
     #[getter]
     fn outliers_in_a_row(&self) -> u16 {
-        match &self.engine {
-            Engine::One(estimator) => estimator.outliers_in_a_row(),
-            Engine::Many(estimator) => estimator.outliers_in_a_row(),
-        }
+        either!(&self.engine, estimator => estimator.outliers_in_a_row())
     }
 
     /// Whether samples correct the estimate. Set it to turn that off and on.
     #[getter]
     fn adapting(&self) -> bool {
-        match &self.engine {
-            Engine::One(estimator) => estimator.is_adapting(),
-            Engine::Many(estimator) => estimator.is_adapting(),
-        }
+        either!(&self.engine, estimator => estimator.is_adapting())
     }
 
     #[setter]
     fn set_adapting(&mut self, adapting: bool) {
-        match &mut self.engine {
-            Engine::One(estimator) => estimator.set_adaptation(adapting),
-            Engine::Many(estimator) => estimator.set_adaptation(adapting),
-        }
+        either!(&mut self.engine, estimator => estimator.set_adaptation(adapting))
     }
 
     fn __repr__(&self) -> String {

@@ -1,33 +1,21 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::{Const, OMatrix};
-use serde::{Deserialize, Serialize};
 
 use crate::error::{check_entries, check_finite};
-use crate::snapshot::square;
-use crate::{
-    ArmaxMethod, Dimension, Error, Lags, Real, RecursiveArmax, RecursiveLeastSquares, SnapshotVersion,
-};
+use crate::snapshot::{snapshot, square};
+use crate::{ArmaxMethod, Dimension, Error, Lags, Real, RecursiveArmax, RecursiveLeastSquares};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> {
-    version: SnapshotVersion,
-    lags: Lags<T, N, D>,
-    estimator: RecursiveLeastSquares<T, N>,
-    #[serde(with = "square")]
-    gradients: OMatrix<T, N, N>,
-    residual: T,
-    nc: usize,
-    method: ArmaxMethod,
-}
-
-impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> From<RecursiveArmax<T, N, D>>
-    for Snapshot<T, N, D>
-{
-    fn from(armax: RecursiveArmax<T, N, D>) -> Self {
-        let RecursiveArmax { lags, estimator, gradients, residual, nc, method, .. } = armax;
-        Snapshot { version: SnapshotVersion, lags, estimator, gradients, residual, nc, method }
+snapshot! {
+    Snapshot<T, N, D> of RecursiveArmax<T, N, D>
+    where [T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension] {
+        lags: Lags<T, N, D>;
+        estimator: RecursiveLeastSquares<T, N>;
+        #[serde(with = "square")]
+        gradients: OMatrix<T, N, N>;
+        residual: T;
+        nc: usize;
+        method: ArmaxMethod;
     }
 }
 
@@ -44,7 +32,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
         check_finite("residual", &[residual])?;
         let scratch = size.scratch::<T, 2, 0>();
         let armax = RecursiveArmax { lags, estimator, gradients, residual, nc, method, scratch };
-        armax.check_stable(armax.estimator.parameters().as_slice())?;
+        armax.check_stable(armax.estimator.parameters())?;
         Ok(armax)
     }
 }

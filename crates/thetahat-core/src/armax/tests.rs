@@ -6,8 +6,8 @@ use std::vec::Vec;
 
 use nalgebra::{Const, SVector, Vector4};
 
-use crate::arx::is_large;
 use crate::arx::tests::{Plant, inputs_at, one, stable_polynomial};
+use crate::lags::is_large;
 use crate::noise::Noise;
 use crate::stability::{is_stable, move_stably};
 use crate::{

@@ -1,24 +1,15 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::Const;
-use serde::{Deserialize, Serialize};
 
-use crate::{Dimension, Error, Lags, Real, RecursiveArx, RecursiveLeastSquares, SnapshotVersion};
+use crate::snapshot::snapshot;
+use crate::{Dimension, Error, Lags, Real, RecursiveArx, RecursiveLeastSquares};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> {
-    version: SnapshotVersion,
-    lags: Lags<T, N, D>,
-    estimator: RecursiveLeastSquares<T, N>,
-}
-
-impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> From<RecursiveArx<T, N, D>>
-    for Snapshot<T, N, D>
-{
-    fn from(arx: RecursiveArx<T, N, D>) -> Self {
-        let RecursiveArx { lags, estimator } = arx;
-        Snapshot { version: SnapshotVersion, lags, estimator }
+snapshot! {
+    Snapshot<T, N, D> of RecursiveArx<T, N, D>
+    where [T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension] {
+        lags: Lags<T, N, D>;
+        estimator: RecursiveLeastSquares<T, N>;
     }
 }
 

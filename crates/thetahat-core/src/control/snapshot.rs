@@ -1,39 +1,33 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::OVector;
-use serde::{Deserialize, Serialize};
 
 use super::RstController;
 use crate::error::check_length;
-use crate::snapshot::vector;
-use crate::{Dimension, Error, Real, SnapshotVersion};
+use crate::snapshot::{snapshot, vector};
+use crate::{Dimension, Error, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "vector")]
-    r: OVector<T, N>,
-    #[serde(with = "vector")]
-    s: OVector<T, N>,
-    #[serde(with = "vector")]
-    observer: OVector<T, N>,
-    gain: T,
-    /// None where there is none.
-    lowest: Option<T>,
-    highest: Option<T>,
-    #[serde(with = "vector")]
-    state: OVector<T, N>,
-    input: T,
+snapshot! {
+    Snapshot<T, N> of RstController<T, N> where [T: Real, N: Dimension] {
+        #[serde(with = "vector")]
+        r: OVector<T, N>;
+        #[serde(with = "vector")]
+        s: OVector<T, N>;
+        #[serde(with = "vector")]
+        observer: OVector<T, N>;
+        gain: T;
+        /// None where there is none.
+        lowest: Option<T> => lowest, limit;
+        highest: Option<T> => highest, limit;
+        #[serde(with = "vector")]
+        state: OVector<T, N>;
+        input: T;
+    }
 }
 
-impl<T: Real, N: Dimension> From<RstController<T, N>> for Snapshot<T, N> {
-    fn from(controller: RstController<T, N>) -> Self {
-        let RstController { r, s, observer, gain, lowest, highest, state, input } = controller;
-        let limit = |value: T| value.is_finite().then_some(value);
-        let (lowest, highest) = (limit(lowest), limit(highest));
-        Snapshot { version: SnapshotVersion, r, s, observer, gain, lowest, highest, state, input }
-    }
+/// A limit, if there is one.
+fn limit<T: Real>(limit: &T) -> Option<T> {
+    limit.is_finite().then_some(*limit)
 }
 
 impl<T: Real, N: Dimension> TryFrom<Snapshot<T, N>> for RstController<T, N> {

@@ -1,35 +1,18 @@
 //! What is written, and how it is checked when it is read back.
 
-use serde::{Deserialize, Serialize};
-
 use super::Sum;
-use crate::snapshot::number;
-use crate::{ChangeDetector, Error, Real, SnapshotVersion};
+use crate::snapshot::{number, snapshot};
+use crate::{ChangeDetector, Error, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real> {
-    version: SnapshotVersion,
-    #[serde(with = "number")]
-    mean_threshold: T,
-    #[serde(with = "number")]
-    variance_threshold: T,
-    mean_up: Sum<T>,
-    mean_down: Sum<T>,
-    variance: Sum<T>,
-}
-
-impl<T: Real> From<ChangeDetector<T>> for Snapshot<T> {
-    fn from(detector: ChangeDetector<T>) -> Self {
-        let ChangeDetector { mean_threshold, variance_threshold, mean_up, mean_down, variance } = detector;
-        Snapshot {
-            version: SnapshotVersion,
-            mean_threshold,
-            variance_threshold,
-            mean_up,
-            mean_down,
-            variance,
-        }
+snapshot! {
+    Snapshot<T> of ChangeDetector<T> where [T: Real] {
+        #[serde(with = "number")]
+        mean_threshold: T;
+        #[serde(with = "number")]
+        variance_threshold: T;
+        mean_up: Sum<T>;
+        mean_down: Sum<T>;
+        variance: Sum<T>;
     }
 }
 

@@ -1,21 +1,12 @@
 //! What is written, and how it is checked when it is read back.
 
-use serde::{Deserialize, Serialize};
+use crate::snapshot::snapshot;
+use crate::{Dimension, Error, ExtendedKalmanFilter, KalmanFilter, Real};
 
-use crate::{Dimension, Error, ExtendedKalmanFilter, KalmanFilter, Real, SnapshotVersion};
-
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: SnapshotVersion,
-    linear: KalmanFilter<T, N>,
-    iterations: usize,
-}
-
-impl<T: Real, N: Dimension> From<ExtendedKalmanFilter<T, N>> for Snapshot<T, N> {
-    fn from(filter: ExtendedKalmanFilter<T, N>) -> Self {
-        let ExtendedKalmanFilter { linear, iterations } = filter;
-        Snapshot { version: SnapshotVersion, linear, iterations }
+snapshot! {
+    Snapshot<T, N> of ExtendedKalmanFilter<T, N> where [T: Real, N: Dimension] {
+        linear: KalmanFilter<T, N>;
+        iterations: usize;
     }
 }
 

@@ -1,28 +1,19 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::OVector;
-use serde::{Deserialize, Serialize};
 
-use crate::snapshot::{number, vector};
-use crate::{Covariance, Dimension, Error, KalmanFilter, Real, SnapshotVersion};
+use crate::snapshot::{number, snapshot, vector};
+use crate::{Covariance, Dimension, Error, KalmanFilter, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "vector")]
-    state: OVector<T, N>,
-    covariance: Covariance<T, N>,
-    #[serde(with = "number")]
-    gate: T,
-    release: u16,
-    gated: u16,
-}
-
-impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for Snapshot<T, N> {
-    fn from(filter: KalmanFilter<T, N>) -> Self {
-        let KalmanFilter { state, covariance, gate, release, gated, .. } = filter;
-        Snapshot { version: SnapshotVersion, state, covariance, gate, release, gated }
+snapshot! {
+    Snapshot<T, N> of KalmanFilter<T, N> where [T: Real, N: Dimension] {
+        #[serde(with = "vector")]
+        state: OVector<T, N>;
+        covariance: Covariance<T, N>;
+        #[serde(with = "number")]
+        gate: T;
+        release: u16;
+        gated: u16;
     }
 }
 

@@ -5,8 +5,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Line, Source, is_infinite};
 use crate::error::check_length;
-use crate::snapshot::{Entry, vector};
-use crate::{Dimension, Error, Lags, Real, SnapshotVersion};
+use crate::snapshot::{Entry, snapshot, vector};
+use crate::{Dimension, Error, Lags, Real};
 
 impl Entry for Line {
     const BLANK: Line = Line { index: 0, nb: 0, nk: 0 };
@@ -21,26 +21,18 @@ impl Entry for Line {
     }
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension, D: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "vector")]
-    regressor: OVector<T, N>,
-    #[serde(with = "vector")]
-    delayed: OVector<T, D>,
-    #[serde(with = "vector")]
-    lines: OVector<Line, N>,
-    na: u16,
-    outputs: u16,
-    inputs: usize,
-    awaiting_inputs: bool,
-}
-
-impl<T: Real, N: Dimension, D: Dimension> From<Lags<T, N, D>> for Snapshot<T, N, D> {
-    fn from(lags: Lags<T, N, D>) -> Self {
-        let Lags { regressor, delayed, lines, na, outputs, inputs, awaiting_inputs } = lags;
-        Snapshot { version: SnapshotVersion, regressor, delayed, lines, na, outputs, inputs, awaiting_inputs }
+snapshot! {
+    Snapshot<T, N, D> of Lags<T, N, D> where [T: Real, N: Dimension, D: Dimension] {
+        #[serde(with = "vector")]
+        regressor: OVector<T, N>;
+        #[serde(with = "vector")]
+        delayed: OVector<T, D>;
+        #[serde(with = "vector")]
+        lines: OVector<Line, N>;
+        na: u16;
+        outputs: u16;
+        inputs: usize;
+        awaiting_inputs: bool;
     }
 }
 

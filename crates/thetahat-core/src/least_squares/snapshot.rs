@@ -1,39 +1,22 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::{OMatrix, OVector};
-use serde::{Deserialize, Serialize};
 
 use super::transpose;
-use crate::snapshot::{number, square, vector};
+use crate::snapshot::{number, snapshot, square, vector};
 use crate::triangle::Sum;
-use crate::{Dimension, Error, LeastSquares, Real, SnapshotVersion};
+use crate::{Dimension, Error, LeastSquares, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "square")]
-    factor_rows: OMatrix<Sum<T>, N, N>,
-    #[serde(with = "vector")]
-    rotated_output: OVector<Sum<T>, N>,
-    #[serde(with = "number")]
-    residual_norm: Sum<T>,
-    rows: usize,
-    uncompensated_rows: usize,
-}
-
-impl<T: Real, N: Dimension> From<LeastSquares<T, N>> for Snapshot<T, N> {
-    fn from(problem: LeastSquares<T, N>) -> Self {
-        let LeastSquares { factor_rows, rotated_output, residual_norm, rows, uncompensated_rows, .. } =
-            problem;
-        Snapshot {
-            version: SnapshotVersion,
-            factor_rows,
-            rotated_output,
-            residual_norm,
-            rows,
-            uncompensated_rows,
-        }
+snapshot! {
+    Snapshot<T, N> of LeastSquares<T, N> where [T: Real, N: Dimension] {
+        #[serde(with = "square")]
+        factor_rows: OMatrix<Sum<T>, N, N>;
+        #[serde(with = "vector")]
+        rotated_output: OVector<Sum<T>, N>;
+        #[serde(with = "number")]
+        residual_norm: Sum<T>;
+        rows: usize;
+        uncompensated_rows: usize;
     }
 }
 

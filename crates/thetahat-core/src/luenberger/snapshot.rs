@@ -1,27 +1,17 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::{OMatrix, OVector};
-use serde::{Deserialize, Serialize};
 
-use crate::snapshot::{matrix, vector};
-use crate::{Dimension, Error, LuenbergerObserver, Real, SnapshotVersion};
+use crate::snapshot::{matrix, snapshot, vector};
+use crate::{Dimension, Error, LuenbergerObserver, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "vector")]
-    state: OVector<T, N>,
-    #[serde(with = "matrix")]
-    gain: OMatrix<T, N, M>,
-}
-
-impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<LuenbergerObserver<T, N, M>>
-    for Snapshot<T, N, M>
-{
-    fn from(observer: LuenbergerObserver<T, N, M>) -> Self {
-        let LuenbergerObserver { state, gain } = observer;
-        Snapshot { version: SnapshotVersion, state, gain }
+snapshot! {
+    Snapshot<T, N, M> of LuenbergerObserver<T, N, M>
+    where [T: Real, N: Dimension + Dimension<M>, M: Dimension] {
+        #[serde(with = "vector")]
+        state: OVector<T, N>;
+        #[serde(with = "matrix")]
+        gain: OMatrix<T, N, M>;
     }
 }
 

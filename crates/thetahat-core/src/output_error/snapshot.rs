@@ -1,34 +1,21 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::{Const, OMatrix};
-use serde::{Deserialize, Serialize};
 
 use crate::error::check_length;
 use crate::lags::is_infinite;
-use crate::snapshot::square;
-use crate::{
-    Dimension, Error, Lags, OutputErrorMethod, Real, RecursiveLeastSquares, RecursiveOutputError,
-    SnapshotVersion,
-};
+use crate::snapshot::{snapshot, square};
+use crate::{Dimension, Error, Lags, OutputErrorMethod, Real, RecursiveLeastSquares, RecursiveOutputError};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> {
-    version: SnapshotVersion,
-    lags: Lags<T, N, D>,
-    estimator: RecursiveLeastSquares<T, N>,
-    #[serde(with = "square")]
-    past: OMatrix<T, N, N>,
-    nf: usize,
-    method: OutputErrorMethod,
-}
-
-impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> From<RecursiveOutputError<T, N, D>>
-    for Snapshot<T, N, D>
-{
-    fn from(model: RecursiveOutputError<T, N, D>) -> Self {
-        let RecursiveOutputError { lags, estimator, past, nf, method, .. } = model;
-        Snapshot { version: SnapshotVersion, lags, estimator, past, nf, method }
+snapshot! {
+    Snapshot<T, N, D> of RecursiveOutputError<T, N, D>
+    where [T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension] {
+        lags: Lags<T, N, D>;
+        estimator: RecursiveLeastSquares<T, N>;
+        #[serde(with = "square")]
+        past: OMatrix<T, N, N>;
+        nf: usize;
+        method: OutputErrorMethod;
     }
 }
 
@@ -51,7 +38,7 @@ impl<T: Real, N: Dimension + Dimension<Const<1>>, D: Dimension> TryFrom<Snapshot
         }
         let scratch = size.scratch::<T, 2, 0>();
         let model = RecursiveOutputError { lags, estimator, past, nf, method, scratch };
-        model.check_stable(model.estimator.parameters().clone())?;
+        model.check_stable(model.estimator.parameters())?;
         Ok(model)
     }
 }

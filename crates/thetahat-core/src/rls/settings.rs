@@ -212,3 +212,58 @@ macro_rules! pass_on_settings {
     };
 }
 pub(crate) use pass_on_settings;
+
+/// What some of the estimators with delay lines pass on to their least squares too, each by its name.
+macro_rules! pass_on {
+    ($($what:ident),+) => {
+        $(pass_on!(@ $what);)+
+    };
+    (@ start) => {
+        /// The same with another start. See
+        /// [`RecursiveLeastSquares::with_start`](crate::RecursiveLeastSquares::with_start).
+        ///
+        /// Errors: none that can occur.
+        pub fn with_start(self, start: crate::RlsStart) -> Result<Self, crate::Error> {
+            Ok(Self { estimator: self.estimator.with_start(start)?, ..self })
+        }
+    };
+    (@ solution) => {
+        /// The same started from a batch solution on the regressors. See
+        /// [`RecursiveLeastSquares::with_solution`](crate::RecursiveLeastSquares::with_solution), whose errors it has.
+        pub fn with_solution(self, solution: &crate::Solution<T, N>) -> Result<Self, crate::Error> {
+            Ok(Self { estimator: self.estimator.with_solution(solution)?, ..self })
+        }
+    };
+    (@ noise_variance) => {
+        /// The same with a noise variance that is known from earlier samples. See
+        /// [`RecursiveLeastSquares::with_noise_variance`](crate::RecursiveLeastSquares::with_noise_variance), whose
+        /// errors it has.
+        pub fn with_noise_variance(mut self, variance: T, samples: usize) -> Result<Self, crate::Error> {
+            self.set_noise_variance(variance, samples)?;
+            Ok(self)
+        }
+
+        /// Sets the noise variance: see
+        /// [`RecursiveLeastSquares::set_noise_variance`](crate::RecursiveLeastSquares::set_noise_variance), whose
+        /// errors it has.
+        pub fn set_noise_variance(&mut self, variance: T, samples: usize) -> Result<(), crate::Error> {
+            self.estimator.set_noise_variance(variance, samples)
+        }
+    };
+    (@ dead_zone) => {
+        /// The same with a dead zone, which is compared with the error that corrects. See
+        /// [`RecursiveLeastSquares::with_dead_zone`](crate::RecursiveLeastSquares::with_dead_zone), whose errors it
+        /// has.
+        pub fn with_dead_zone(mut self, width: T) -> Result<Self, crate::Error> {
+            self.set_dead_zone(width)?;
+            Ok(self)
+        }
+
+        /// Sets the dead zone: see
+        /// [`RecursiveLeastSquares::set_dead_zone`](crate::RecursiveLeastSquares::set_dead_zone), whose errors it has.
+        pub fn set_dead_zone(&mut self, width: T) -> Result<(), crate::Error> {
+            self.estimator.set_dead_zone(width)
+        }
+    };
+}
+pub(crate) use pass_on;

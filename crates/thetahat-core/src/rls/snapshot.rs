@@ -1,7 +1,6 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::{OMatrix, OVector};
-use serde::{Deserialize, Serialize};
 
 use super::after::After;
 use super::residuals::Residuals;
@@ -9,74 +8,31 @@ use super::settings::{check_parameters, is_prior};
 use crate::error::{check_finite, check_length};
 use crate::forgetting::{Forgetting, Phase};
 use crate::outliers::Watch;
-use crate::snapshot::{matrix, vector};
-use crate::{Covariance, Dimension, Error, Outliers, Real, RecursiveLeastSquares, SnapshotVersion};
+use crate::snapshot::{matrix, snapshot, vector};
+use crate::{Covariance, Dimension, Error, Outliers, Real, RecursiveLeastSquares};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "matrix")]
-    parameters: OMatrix<T, N, M>,
-    covariance: Covariance<T, N>,
-    #[serde(with = "vector")]
-    bounds: OVector<T, N>,
-    residuals: Residuals<T, M>,
-    forgetting: Forgetting<T>,
-    dead_zone: T,
-    outliers: Outliers<T>,
-    outliers_in_a_row: u16,
-    #[serde(with = "vector")]
-    held: OVector<bool, N>,
-    #[serde(with = "matrix")]
-    noises: OMatrix<T, N, M>,
-    turn: u16,
-    phase: Phase,
-    shares: u16,
-    shares_left: u16,
-    adapting: bool,
-}
-
-impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> From<RecursiveLeastSquares<T, N, M>>
-    for Snapshot<T, N, M>
-{
-    fn from(estimator: RecursiveLeastSquares<T, N, M>) -> Self {
-        let RecursiveLeastSquares {
-            parameters,
-            covariance,
-            bounds,
-            residuals,
-            forgetting,
-            dead_zone,
-            outliers,
-            held,
-            noises,
-            turn,
-            phase,
-            shares,
-            shares_left,
-            adapting,
-            ..
-        } = estimator;
-        let version = SnapshotVersion;
-        Snapshot {
-            version,
-            parameters,
-            covariance,
-            bounds,
-            residuals,
-            forgetting,
-            dead_zone,
-            outliers: outliers.rule(),
-            outliers_in_a_row: outliers.in_a_row,
-            held,
-            noises,
-            turn,
-            phase,
-            shares,
-            shares_left,
-            adapting,
-        }
+snapshot! {
+    Snapshot<T, N, M> of RecursiveLeastSquares<T, N, M>
+    where [T: Real, N: Dimension + Dimension<M>, M: Dimension] {
+        #[serde(with = "matrix")]
+        parameters: OMatrix<T, N, M>;
+        covariance: Covariance<T, N>;
+        #[serde(with = "vector")]
+        bounds: OVector<T, N>;
+        residuals: Residuals<T, M>;
+        forgetting: Forgetting<T>;
+        dead_zone: T;
+        outliers: Outliers<T> => outliers, Watch::rule;
+        outliers_in_a_row: u16 => outliers, |watch: &Watch<T>| watch.in_a_row;
+        #[serde(with = "vector")]
+        held: OVector<bool, N>;
+        #[serde(with = "matrix")]
+        noises: OMatrix<T, N, M>;
+        turn: u16;
+        phase: Phase;
+        shares: u16;
+        shares_left: u16;
+        adapting: bool;
     }
 }
 

@@ -1,29 +1,19 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::OMatrix;
-use serde::{Deserialize, Serialize};
 
 use super::check_shape;
-use crate::snapshot::{matrix, square};
-use crate::{Covariance, Dimension, Error, LinearObservation, LinearTransition, Real, SnapshotVersion};
+use crate::snapshot::{matrix, snapshot, square};
+use crate::{Covariance, Dimension, Error, LinearObservation, LinearTransition, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Transition<T: Real, N: Dimension + Dimension<U>, U: Dimension> {
-    version: SnapshotVersion,
-    #[serde(with = "square")]
-    state_matrix: OMatrix<T, N, N>,
-    #[serde(with = "matrix")]
-    input_matrix: OMatrix<T, N, U>,
-    noise: Covariance<T, N>,
-}
-
-impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> From<LinearTransition<T, N, U>>
-    for Transition<T, N, U>
-{
-    fn from(model: LinearTransition<T, N, U>) -> Self {
-        let LinearTransition { state_matrix, input_matrix, noise, .. } = model;
-        Transition { version: SnapshotVersion, state_matrix, input_matrix, noise }
+snapshot! {
+    Transition<T, N, U> of LinearTransition<T, N, U>
+    where [T: Real, N: Dimension + Dimension<U>, U: Dimension] {
+        #[serde(with = "square")]
+        state_matrix: OMatrix<T, N, N>;
+        #[serde(with = "matrix")]
+        input_matrix: OMatrix<T, N, U>;
+        noise: Covariance<T, N>;
     }
 }
 
@@ -37,28 +27,14 @@ impl<T: Real, N: Dimension + Dimension<U>, U: Dimension> TryFrom<Transition<T, N
     }
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Observation<
-    T: Real,
-    N: Dimension + Dimension<M>,
-    M: Dimension + Dimension<U> + Dimension<N>,
-    U: Dimension,
-> {
-    version: SnapshotVersion,
-    #[serde(with = "matrix")]
-    output_rows: OMatrix<T, N, M>,
-    #[serde(with = "matrix")]
-    input_matrix: OMatrix<T, M, U>,
-    noise: Covariance<T, M>,
-}
-
-impl<T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<U> + Dimension<N>, U: Dimension>
-    From<LinearObservation<T, N, M, U>> for Observation<T, N, M, U>
-{
-    fn from(model: LinearObservation<T, N, M, U>) -> Self {
-        let LinearObservation { output_rows, input_matrix, noise } = model;
-        Observation { version: SnapshotVersion, output_rows, input_matrix, noise }
+snapshot! {
+    Observation<T, N, M, U> of LinearObservation<T, N, M, U>
+    where [T: Real, N: Dimension + Dimension<M>, M: Dimension + Dimension<U> + Dimension<N>, U: Dimension] {
+        #[serde(with = "matrix")]
+        output_rows: OMatrix<T, N, M>;
+        #[serde(with = "matrix")]
+        input_matrix: OMatrix<T, M, U>;
+        noise: Covariance<T, M>;
     }
 }
 

@@ -1,23 +1,13 @@
 //! What is written, and how it is checked when it is read back.
 
-use serde::{Deserialize, Serialize};
+use crate::snapshot::snapshot;
+use crate::{Dimension, Error, Lags, Real, RecursiveLeastSquares, RecursiveVectorArx};
 
-use crate::{Dimension, Error, Lags, Real, RecursiveLeastSquares, RecursiveVectorArx, SnapshotVersion};
-
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> {
-    version: SnapshotVersion,
-    lags: Lags<T, N, D>,
-    estimator: RecursiveLeastSquares<T, N, M>,
-}
-
-impl<T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension> From<RecursiveVectorArx<T, N, M, D>>
-    for Snapshot<T, N, M, D>
-{
-    fn from(arx: RecursiveVectorArx<T, N, M, D>) -> Self {
-        let RecursiveVectorArx { lags, estimator } = arx;
-        Snapshot { version: SnapshotVersion, lags, estimator }
+snapshot! {
+    Snapshot<T, N, M, D> of RecursiveVectorArx<T, N, M, D>
+    where [T: Real, N: Dimension + Dimension<M>, M: Dimension, D: Dimension] {
+        lags: Lags<T, N, D>;
+        estimator: RecursiveLeastSquares<T, N, M>;
     }
 }
 

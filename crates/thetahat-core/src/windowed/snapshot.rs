@@ -1,42 +1,23 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::OVector;
-use serde::{Deserialize, Serialize};
 
 use super::Window;
 use crate::error::{check_entries, check_length};
-use crate::snapshot::vector;
-use crate::{Dimension, Error, LeastSquares, Real, SnapshotVersion, WindowedLeastSquares};
+use crate::snapshot::{snapshot, vector};
+use crate::{Dimension, Error, LeastSquares, Real, WindowedLeastSquares};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, N: Dimension, B: Dimension> {
-    version: SnapshotVersion,
-    window: Window,
-    #[serde(with = "vector")]
-    stored: OVector<T, B>,
-    newer: LeastSquares<T, N>,
-    current: LeastSquares<T, N>,
-    #[serde(with = "vector")]
-    parameters: OVector<T, N>,
-    older_blocks: usize,
-    newer_blocks: usize,
-}
-
-impl<T: Real, N: Dimension, B: Dimension> From<WindowedLeastSquares<T, N, B>> for Snapshot<T, N, B> {
-    fn from(windowed: WindowedLeastSquares<T, N, B>) -> Self {
-        let WindowedLeastSquares {
-            window,
-            stored,
-            newer,
-            current,
-            parameters,
-            older_blocks,
-            newer_blocks,
-            ..
-        } = windowed;
-        let version = SnapshotVersion;
-        Snapshot { version, window, stored, newer, current, parameters, older_blocks, newer_blocks }
+snapshot! {
+    Snapshot<T, N, B> of WindowedLeastSquares<T, N, B> where [T: Real, N: Dimension, B: Dimension] {
+        window: Window;
+        #[serde(with = "vector")]
+        stored: OVector<T, B>;
+        newer: LeastSquares<T, N>;
+        current: LeastSquares<T, N>;
+        #[serde(with = "vector")]
+        parameters: OVector<T, N>;
+        older_blocks: usize;
+        newer_blocks: usize;
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Const, OVector};
 
 use super::closed_loop::ClosedLoop;
 use super::{Distrust, Fallback, ResponseWanted, TunerSettings, TunerState};
-use crate::arx::is_large;
+use crate::lags::is_large;
 use crate::ud::dot;
 use crate::{
     Action, ArxOrders, Dimension, Error, Forgetting, Innovation, InputOrders, Lags, Real,

@@ -1,34 +1,23 @@
 //! What is written, and how it is checked when it is read back.
 
 use nalgebra::Const;
-use serde::{Deserialize, Serialize};
 
 use super::{Adaptation, ClosedLoop, DirectSelfTuner, Filter};
 use crate::error::{check_entries, check_finite};
-use crate::{Dimension, Error, Lags, Real, SnapshotVersion};
+use crate::snapshot::snapshot;
+use crate::{Dimension, Error, Lags, Real};
 
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
-pub(super) struct Snapshot<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension> {
-    version: SnapshotVersion,
-    lags: Lags<T, P, D>,
-    adaptation: Adaptation<T, P>,
-    closed: ClosedLoop<T, N>,
-    of_r: usize,
-    filtered_inputs: [T; 3],
-    filtered_outputs: [T; 3],
-    output: T,
-    known: T,
-}
-
-impl<T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension>
-    From<DirectSelfTuner<T, P, N, D>> for Snapshot<T, P, N, D>
-{
-    fn from(tuner: DirectSelfTuner<T, P, N, D>) -> Self {
-        let DirectSelfTuner { lags, adaptation, closed, of_r, filtered_inputs, .. } = tuner;
-        let DirectSelfTuner { filtered_outputs, output, known, .. } = tuner;
-        let version = SnapshotVersion;
-        Snapshot { version, lags, adaptation, closed, of_r, filtered_inputs, filtered_outputs, output, known }
+snapshot! {
+    Snapshot<T, P, N, D> of DirectSelfTuner<T, P, N, D>
+    where [T: Real, P: Dimension + Dimension<Const<1>>, N: Dimension, D: Dimension] {
+        lags: Lags<T, P, D>;
+        adaptation: Adaptation<T, P>;
+        closed: ClosedLoop<T, N>;
+        of_r: usize;
+        filtered_inputs: [T; 3];
+        filtered_outputs: [T; 3];
+        output: T;
+        known: T;
     }
 }
 

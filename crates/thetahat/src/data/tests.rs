@@ -22,8 +22,8 @@ fn row_of(result: Result<Log, Error>) -> Option<usize> {
 
 #[test]
 fn missing_samples_and_jumps_cut_a_log() {
-    let u = channel("u", &[NAN, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NAN, 1.0, 1.0]);
-    let y = channel("y", &[1.0, 1.0, 1.0, NAN, 1.0, 1.0, 1.0, NAN, 1.0, NAN]);
+    let u = channel("u", [NAN, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, NAN, 1.0, 1.0]);
+    let y = channel("y", [1.0, 1.0, 1.0, NAN, 1.0, 1.0, 1.0, NAN, 1.0, NAN]);
     // The clock has a gap before the sixth row.
     let time = vec![0.0, 1.0, 2.0, 3.0, 4.0, 7.0, 8.0, 9.0, 10.0, 11.0];
     let log = Log::with_time(vec![u, y], time).unwrap();
@@ -41,7 +41,7 @@ fn missing_samples_and_jumps_cut_a_log() {
 
 #[test]
 fn rows_that_are_not_there_are_refused() {
-    let log = Log::new(vec![channel("y", &[1.0, 2.0])], 1.0).unwrap();
+    let log = Log::new(vec![channel("y", [1.0, 2.0])], 1.0).unwrap();
     assert!(log.record(&[], "y", &[rows("1..3")]).is_err());
     assert!(log.record(&[], "y", &[rows("1..2"), rows("2..2")]).is_err());
     assert!(log.record(&[], "z", &[rows("1..2")]).is_err());
@@ -51,7 +51,7 @@ fn rows_that_are_not_there_are_refused() {
 
 #[test]
 fn clocks_are_uniform_up_to_gaps() {
-    let with = |time: &[f64]| Log::with_time(vec![channel("y", &vec![1.0; time.len()])], time.to_vec());
+    let with = |time: &[f64]| Log::with_time(vec![channel("y", vec![1.0; time.len()])], time.to_vec());
     // The median of an even number of steps is the mean of the middle two.
     assert_eq!(with(&[0.0, 1.0, 2.08]).unwrap().sample_time(), 1.04);
     assert_eq!(with(&[0.0, 1.0, 2.0, 3.09]).unwrap().sample_time(), 1.0);
@@ -62,18 +62,18 @@ fn clocks_are_uniform_up_to_gaps() {
     assert_eq!(row_of(with(&[0.0, 1.0, 0.5, 2.0])), Some(3));
     assert_eq!(row_of(with(&[0.0, NAN, 2.0])), Some(2));
     assert_eq!(row_of(with(&[0.0])), None);
-    assert_eq!(row_of(Log::with_time(vec![channel("y", &[1.0, 2.0])], vec![0.0])), None);
+    assert_eq!(row_of(Log::with_time(vec![channel("y", [1.0, 2.0])], vec![0.0])), None);
 }
 
 #[test]
 fn channels_are_checked() {
-    assert_eq!(row_of(Log::new(vec![channel("y", &[1.0, f64::NEG_INFINITY])], 1.0)), Some(2));
+    assert_eq!(row_of(Log::new(vec![channel("y", [1.0, f64::NEG_INFINITY])], 1.0)), Some(2));
     assert!(Log::new(vec![], 1.0).is_err());
-    assert!(Log::new(vec![channel("y", &[])], 1.0).is_err());
-    assert!(Log::new(vec![channel("y", &[1.0]), channel("y", &[1.0])], 1.0).is_err());
-    assert!(Log::new(vec![channel("y", &[1.0]), channel("u", &[1.0, 2.0])], 1.0).is_err());
+    assert!(Log::new(vec![channel("y", [])], 1.0).is_err());
+    assert!(Log::new(vec![channel("y", [1.0]), channel("y", [1.0])], 1.0).is_err());
+    assert!(Log::new(vec![channel("y", [1.0]), channel("u", [1.0, 2.0])], 1.0).is_err());
     for sample_time in [0.0, -1.0, NAN, f64::INFINITY] {
-        assert!(Log::new(vec![channel("y", &[1.0])], sample_time).is_err());
+        assert!(Log::new(vec![channel("y", [1.0])], sample_time).is_err());
     }
 }
 
@@ -82,7 +82,7 @@ fn a_resampled_log_reads_between_samples() {
     let time = [0.0, 1.0, 1.5, 4.0];
     let read = |values: [f64; 4], interpolation| {
         let log =
-            Log::resampled(vec![channel("y", &values)], &time, &Resample::new(0.5, interpolation)).unwrap();
+            Log::resampled(vec![channel("y", values)], &time, &Resample::new(0.5, interpolation)).unwrap();
         assert_eq!((log.rows(), log.sample_time(), log.gaps()), (9, 0.5, 0));
         log.channels()[0].values.clone()
     };
@@ -118,11 +118,7 @@ fn resampling_a_uniform_log_changes_nothing() {
         }
     }
     let two = |step| {
-        Log::resampled(
-            vec![channel("y", &[1.0, 2.0])],
-            &[0.0, 1.0],
-            &Resample::new(step, Interpolation::Hold),
-        )
+        Log::resampled(vec![channel("y", [1.0, 2.0])], &[0.0, 1.0], &Resample::new(step, Interpolation::Hold))
     };
     assert!(two(1e-9).is_err() && two(0.0).is_err() && two(-1.0).is_err() && two(NAN).is_err());
     // One row is no log.
@@ -136,7 +132,7 @@ fn offsets_are_means_and_lines() {
         (0..300).map(|k| 100.0 + 0.5 * f64::from(k) + if k < 120 { 0.0 } else { 40.0 }).collect();
     let mut values: Vec<f64> = time.iter().map(|t| 3.0 - 0.2 * (t - 100.0)).collect();
     values[7] = NAN;
-    let log = Log::with_time(vec![channel("y", &values), channel("v", &noise.take(300))], time).unwrap();
+    let log = Log::with_time(vec![channel("y", &values), channel("v", noise.take(300))], time).unwrap();
     let segments = log.segments(&["y"], &[rows("3..250")]).unwrap();
     let offset = |name: &str, detrend| Offset::estimate(detrend, &log, name, &segments);
 
@@ -166,7 +162,7 @@ fn small_signals_on_large_offsets_keep_their_digits() {
     // Multiples of 2^-20 beside 1e9: all sums are exact.
     let small: Vec<f64> = noise.take(1000).iter().map(|v| (v * 1024.0).round() / 1_048_576.0).collect();
     let large: Vec<f64> = small.iter().map(|v| 1e9 + v).collect();
-    let mut log = Log::new(vec![channel("y", &large), channel("c", &[0.1; 1000])], 1.0).unwrap();
+    let mut log = Log::new(vec![channel("y", &large), channel("c", [0.1; 1000])], 1.0).unwrap();
     let segments = log.segments(&["y"], &[rows("1..1000")]).unwrap();
     let mean = Offset::estimate(Detrend::Mean, &log, "y", &segments).unwrap();
     log.remove("y", &mean);
@@ -181,8 +177,8 @@ fn small_signals_on_large_offsets_keep_their_digits() {
 
 #[test]
 fn a_part_is_cut_where_the_log_is() {
-    let u = channel("u", &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
-    let y = channel("y", &[0.5, 1.5, NAN, 3.5, 4.5, 5.5]);
+    let u = channel("u", [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    let y = channel("y", [0.5, 1.5, NAN, 3.5, 4.5, 5.5]);
     // The clock has a gap before the fourth row.
     let time = vec![0.0, 0.1, 0.2, 0.9, 1.0, 1.1];
     let log = Log::with_time(vec![u.clone(), y.clone()], time).unwrap();
@@ -207,7 +203,7 @@ fn a_part_is_cut_where_the_log_is() {
 
 #[test]
 fn a_stored_log_comes_back() {
-    let log = Log::with_time(vec![channel("y", &[1.0, 2.0, 3.0, 4.0])], vec![0.0, 0.1, 0.5, 0.6]).unwrap();
+    let log = Log::with_time(vec![channel("y", [1.0, 2.0, 3.0, 4.0])], vec![0.0, 0.1, 0.5, 0.6]).unwrap();
     let joined = Log::join(vec![log.clone(), log]).unwrap();
     let again = |starts: &[usize], boundaries: &[usize], time: Option<Vec<f64>>| {
         Log::restored(

@@ -52,7 +52,7 @@ fn near(found: f64, expected: f64) -> bool {
 fn a_series_is_forecast_beyond_its_end() {
     let model = model(-0.5, &[]);
     let y = [6.0, 4.0, 7.0, 6.5, 5.5];
-    let log = Log::new(vec![channel("y", &y)], 2.0).unwrap();
+    let log = Log::new(vec![channel("y", y)], 2.0).unwrap();
     let applied = predicted(&model, &log, &[], 3);
     let deviations = applied.standard_deviations.unwrap();
     assert_eq!((applied.beyond, applied.predicted.len(), deviations.len()), (3, 8, 8));
@@ -67,7 +67,7 @@ fn a_series_is_forecast_beyond_its_end() {
     assert!(deviations[..3].iter().all(|deviation| deviation.is_nan()));
     assert_eq!(deviations[3..], spread);
     // The last two values are missing: two of three steps lie in the log.
-    let log = Log::new(vec![channel("y", &[y[0], y[1], y[4], f64::NAN, f64::NAN])], 2.0).unwrap();
+    let log = Log::new(vec![channel("y", [y[0], y[1], y[4], f64::NAN, f64::NAN])], 2.0).unwrap();
     let applied = predicted(&model, &log, &[], 3);
     assert_eq!((applied.beyond, applied.predicted.len()), (1, 6));
     let last = y[4] - level(2);
@@ -84,7 +84,7 @@ fn a_series_is_forecast_beyond_its_end() {
 #[test]
 fn rows_that_were_not_asked_for_are_not_forecast() {
     let model = model(-0.5, &[]);
-    let log = Log::new(vec![channel("y", &[1.0, 2.0, 3.0, 4.0])], 2.0).unwrap();
+    let log = Log::new(vec![channel("y", [1.0, 2.0, 3.0, 4.0])], 2.0).unwrap();
     let rows = |text: &str| [text.parse().unwrap()];
     let applied = predicted(&model, &log, &rows("1..3"), 2);
     assert_eq!((applied.beyond, applied.predicted.len()), (0, 4));
@@ -92,7 +92,7 @@ fn rows_that_were_not_asked_for_are_not_forecast() {
     assert_eq!(predicted(&model, &log, &rows("2..4"), 2).beyond, 2);
     // One row is enough for this model, and none is not.
     assert_eq!(predicted(&model, &log, &rows("4..4"), 2).beyond, 2);
-    let none = Log::new(vec![channel("y", &[f64::NAN; 4])], 2.0).unwrap();
+    let none = Log::new(vec![channel("y", [f64::NAN; 4])], 2.0).unwrap();
     assert_eq!(predicted(&model, &none, &[], 2).beyond, 0);
     let far =
         apply(&model.into(), &log, &[], None, Horizon::Steps { steps: usize::MAX }, InitialCondition::Drop);
@@ -105,7 +105,7 @@ fn missing_outputs_at_the_end_are_forecast_from_their_inputs() {
     let nan = f64::NAN;
     let u = [0.0, 1.0, -1.0, 2.0, 3.0, 1.0, 0.0];
     let y = [5.0, 6.0, 7.0, nan, nan, nan, nan];
-    let log = |u: &[f64]| Log::new(vec![channel("u", u), channel("y", &y)], 2.0).unwrap();
+    let log = |u: &[f64]| Log::new(vec![channel("u", u), channel("y", y)], 2.0).unwrap();
     let applied = predicted(&model, &log(&u), &[], 3);
     assert_eq!((applied.beyond, applied.predicted.len()), (0, 7));
     let mut last = y[2] - level(2);
@@ -127,7 +127,7 @@ fn missing_outputs_at_the_end_are_forecast_from_their_inputs() {
 fn a_jump_of_the_clock_ends_the_forecast() {
     let nan = f64::NAN;
     let time = vec![0.0, 2.0, 4.0, 6.0, 20.0, 22.0];
-    let y = channel("y", &[1.0, 2.0, 3.0, nan, nan, nan]);
+    let y = channel("y", [1.0, 2.0, 3.0, nan, nan, nan]);
     let log = Log::with_time(vec![y], time).unwrap();
     let applied = predicted(&model(-0.5, &[]), &log, &[], 4);
     assert_eq!(applied.beyond, 0);
@@ -139,10 +139,10 @@ fn free_runs_have_no_deviations_and_from_zero_they_grow() {
     let polynomial = model(-0.5, &[2.0]);
     let model = polynomial.clone().into();
     let y = [5.0, 6.0, 7.0, 5.0, 4.0];
-    let log = Log::new(vec![channel("u", &[1.0; 5]), channel("y", &y)], 2.0).unwrap();
+    let log = Log::new(vec![channel("u", [1.0; 5]), channel("y", y)], 2.0).unwrap();
     let run = one(apply(&model, &log, &[], None, Horizon::FreeRun, InitialCondition::Estimate).unwrap());
     assert_eq!((run.beyond, run.standard_deviations, run.predicted.len()), (0, None, 5));
-    let inputs = Log::new(vec![channel("u", &[1.0; 5])], 2.0).unwrap();
+    let inputs = Log::new(vec![channel("u", [1.0; 5])], 2.0).unwrap();
     let run = one(apply(&model, &inputs, &[], None, Horizon::FreeRun, InitialCondition::Zero).unwrap());
     assert_eq!((run.measured, run.standard_deviations, run.predicted.len()), (None, None, 5));
     let zero =

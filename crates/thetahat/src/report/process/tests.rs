@@ -105,7 +105,7 @@ fn an_irregular_clock_says_what_a_fine_one_does() {
     // Rows by chance, and all at which the input moves.
     let kept: Vec<usize> = (0..2000).filter(|&k| k == 0 || u[k] != u[k - 1] || (k * k) % 97 < 9).collect();
     let of = |values: &[f64]| kept.iter().map(|&k| values[k]).collect::<Vec<_>>();
-    let log = Log::recorded(vec![channel("u", &of(&u)), channel("y", &of(&y))], of(&fine)).unwrap();
+    let log = Log::recorded(vec![channel("u", of(&u)), channel("y", of(&y))], of(&fine)).unwrap();
     let found = values(&fit(&log, &plan("p1d")).unwrap());
     for (value, truth) in found.iter().zip(truth) {
         assert!((value - truth).abs() < 1e-7, "{found:?}");

@@ -146,7 +146,8 @@ fn delays_are_those_of_the_plan() {
 #[test]
 fn what_makes_no_sense_is_refused() {
     let log = log(300, 0.3);
-    let cases: [(fn(&mut StateSpacePlan), &str); 12] = [
+    type Damage = fn(&mut StateSpacePlan);
+    let cases: [(Damage, &str); 12] = [
         (|plan| plan.outputs.clear(), "there is none"),
         (|plan| plan.outputs.push("u1".to_owned()), "'u1' is there twice"),
         (|plan| plan.outputs.push("y9".to_owned()), "y9"),

@@ -166,7 +166,8 @@ fn inputs_that_wait_act_so_much_later() {
 #[test]
 fn a_damaged_model_is_refused() {
     let (_, states) = pair();
-    let cases: [(fn(&mut StateSpaceModel), &str); 9] = [
+    type Damage = fn(&mut StateSpaceModel);
+    let cases: [(Damage, &str); 9] = [
         (|model| model.f[0].truncate(1), "f is not 2 x 2"),
         (|model| model.g[1][0] = f64::NAN, "g has a value that is not finite"),
         (|model| model.delays = vec![1], "delays"),

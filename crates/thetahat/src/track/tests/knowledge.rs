@@ -8,7 +8,7 @@ use crate::tests::channel;
 /// A fit of rows of the log.
 fn fit(inputs: &[[f64; 2]], y: &[f64], rows: &str, orders: Orders, detrend: Detrend) -> Report {
     let input = |j: usize| inputs.iter().map(|u| u[j]).collect::<Vec<_>>();
-    let channels = vec![channel("u", input(0)), channel("v", input(1)), channel("y", y.to_vec())];
+    let channels = vec![channel("u", input(0)), channel("v", input(1)), channel("y", y)];
     let plan = Plan {
         estimate: vec![rows.parse().unwrap()],
         detrend,

@@ -278,8 +278,8 @@ fit_options! {
     /// After so long begin no iteration, and look for no further start
     time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R];
     /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule;
-    /// huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not
-    /// said); inf, the largest error
+    /// huber or huber:K, of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if
+    /// not said); inf, the largest error
     norm: Option<NormOption>, "2|1|huber[:K]|inf", "2", CRITERION, [P I];
     /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     bound: Vec<Bound>, "NAME=LOW..HIGH", "", CRITERION, [P I];

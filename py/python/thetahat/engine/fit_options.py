@@ -69,8 +69,8 @@ class FitOptions(TypedDict, total=False):
         After so long begin no iteration, and look for no further start
     norm
         What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
-        rule; huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K =
-        1.345 if not said); inf, the largest error [default: 2]
+        rule; huber or huber:K, of squares up to K times the scale of the errors and of absolute values
+        beyond (K = 1.345 if not said); inf, the largest error [default: 2]
     bound
         Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     dc_gain
@@ -152,8 +152,8 @@ class ImpulseResponseOptions(TypedDict, total=False):
         fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
     norm
         What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
-        rule; huber[:K], of squares up to K times the scale of the errors and of absolute values beyond (K =
-        1.345 if not said); inf, the largest error [default: 2]
+        rule; huber or huber:K, of squares up to K times the scale of the errors and of absolute values
+        beyond (K = 1.345 if not said); inf, the largest error [default: 2]
     bound
         Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     dc_gain

@@ -355,7 +355,7 @@ fn several_outputs_and_expressions_take_every_verb() {
     assert!(names.contains(&"y: u(k-1)^2") && names.contains(&"z: sqrt(z)(k-1)"), "{names:?}");
     assert_eq!(report["estimation"]["maps"].as_array().map(Vec::len), Some(2));
     let page = folder.read("page.html");
-    assert!(page.contains("Choice of functions, y") && page.contains("Model, z"));
+    assert!(page.contains("y: Choice of functions") && page.contains("z: Choice of functions"));
     let table = folder.done(&format!("fit log.csv {options}")).stdout;
     assert!(table.contains("output y") && table.contains("z: forward regression"), "{table}");
     let run = folder.done("predict model.json log.csv --sample-time 0.1 --horizon 3");

@@ -124,7 +124,7 @@ fn a_frequency_response_makes_a_process() {
         table.contains("outside of the response, u") && table.contains("apart from the response, u [%]"),
         "{table}"
     );
-    assert!(folder.read("compare.html").contains("points outside of the response"));
+    assert!(folder.read("compare.html").contains("outside of the response, u"));
     let json = folder
         .done("compare model.json late.json log.csv --sample-time 1 --over response.json --format json")
         .stdout;

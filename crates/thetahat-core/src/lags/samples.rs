@@ -97,7 +97,8 @@ pub(crate) fn is_large<T: Real>(sample: T, size: usize) -> bool {
     sample * sample * T::from_count(size.max(1)) > T::LARGEST_ENTRY
 }
 
-/// How an estimator with one output takes inputs and rows of a log, by its `take_sample(inputs, output, inputs_follow)`.
+/// How an estimator with one output takes inputs and rows of a log, by its `take_sample(inputs, output,
+/// inputs_follow)`.
 macro_rules! take_rows {
     () => {
         /// u(k), one number for each input: what acts on the plant from now on, until the next measurement, as the
@@ -155,8 +156,8 @@ macro_rules! tell_predictions {
             self.predict_in(&mut self.lags.clone(), future_inputs, outputs)
         }
 
-        /// The same as [`predict`](Self::predict) in delay lines of the caller, such as a clone of [`lags`](Self::lags),
-        /// whose samples are lost: with `Dyn` it does not allocate.
+        /// The same as [`predict`](Self::predict) in delay lines of the caller, such as a clone of
+        /// [`lags`](Self::lags), whose samples are lost: with `Dyn` it does not allocate.
         ///
         /// Errors: those of `predict`; [`Error::Length`](crate::Error::Length) (only with `Dyn`) if the lines have
         /// another size.

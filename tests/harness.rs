@@ -96,7 +96,8 @@ impl Folder {
         run
     }
 
-    /// Runs `thetahat fit` and gives its report without its plan, which may say the same in other words: what was found.
+    /// Runs `thetahat fit` and gives its report without its plan, which may say the same in other words: what was
+    /// found.
     pub(crate) fn fit(&self, line: &str) -> Value {
         let mut report = self.planned(line);
         report.as_object_mut().and_then(|report| report.remove("plan")).expect("a plan");

@@ -2,8 +2,8 @@
 //!
 //! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half,
 //! `online` the steppers, `filter` and `track` the steppers behind logs. `journal` is what has been done with which of
-//! many logs. `plan` reads options of a fit, `array` reads and makes NumPy arrays, `error` is the one map of errors, `in_use` what is said of an
-//! object that another call uses, `work` runs what takes long.
+//! many logs. `plan` reads options of a fit, `array` reads and makes NumPy arrays, `error` is the one map of errors,
+//! `in_use` what is said of an object that another call uses, `work` runs what takes long.
 
 mod array;
 mod design;

@@ -36,16 +36,16 @@ def test_reports_are_the_same_to_the_byte(folder: Path) -> None:
     rows = {"estimate": "1..700", "validate": slice(700, 1000)}
     words = ["--estimate=1..700", "--validate=701..1000"]
     cases = {
-        "--na=2 --nb=2": th.arx(log, 2, 2, **rows),  # type: ignore[arg-type]
+        "--model=arx --na=2 --nb=2 --nk=1": th.arx(log, 2, 2, **rows),  # type: ignore[arg-type]
         "--model=armax --na=2 --nb=2 --nc=1 --nk=0": th.armax(log, 2, 2, 1, nk=0, **rows),  # type: ignore[arg-type]
-        "--model=oe --nb=2 --nf=2 --starts=2 --seed=3": th.oe(log, 2, 2, starts=2, seed=3, **rows),  # type: ignore[arg-type]
-        "--model=bj --nb=2 --nc=0 --nd=1 --nf=2": th.bj(log, 2, 0, 1, 2, **rows),  # type: ignore[arg-type]
+        "--model=oe --nb=2 --nf=2 --starts=2 --seed=3 --nk=1": th.oe(log, 2, 2, starts=2, seed=3, **rows),  # type: ignore[arg-type]
+        "--model=bj --nb=2 --nc=0 --nd=1 --nf=2 --nk=1": th.bj(log, 2, 0, 1, 2, **rows),  # type: ignore[arg-type]
         "--na=1..4 --nb=1..3 --nk=0..2": th.search(log, na=range(1, 5), nb=range(1, 4), nk=range(3), **rows),  # type: ignore[arg-type]
         "": th.search(log, **rows),  # type: ignore[arg-type]
         "--narx=none": th.fit(log, narx="none", **rows),  # type: ignore[arg-type]
-        "--na=2 --nb=2 --method=iv": th.iv(log, 2, 2, **rows),  # type: ignore[arg-type]
-        "--na=2 --nb=2 --norm=1 --bound=a1=-1.5..0": th.arx(log, 2, 2, norm=1, bound={"a1": (-1.5, 0)}, **rows),  # type: ignore[arg-type]
-        "--na=2 --nb=0": th.arx(log, 2, 0, **rows),  # type: ignore[arg-type]
+        "--model=arx --na=2 --nb=2 --method=iv --nk=1": th.iv(log, 2, 2, **rows),  # type: ignore[arg-type]
+        "--model=arx --na=2 --nb=2 --norm=1 --bound=a1=-1.5..0 --nk=1": th.arx(log, 2, 2, norm=1, bound={"a1": (-1.5, 0)}, **rows),  # type: ignore[arg-type]
+        "--model=arx --na=2 --nb=0 --nk=1": th.arx(log, 2, 0, **rows),  # type: ignore[arg-type]
     }
     for options, model in cases.items():
         text = program(folder, "fit", LOG, "--time=t", *words, *options.split(), "--format=json")
@@ -74,11 +74,11 @@ def test_several_logs_and_resampling(folder: Path) -> None:
     rows = Path(LOG).read_text().splitlines()
     Path("a.csv").write_text("\n".join(rows[:400] + rows[401:500]) + "\n")
     Path("b.csv").write_text("\n".join([rows[0], *rows[600:]]) + "\n")
-    words = ["fit", "a.csv", "b.csv", "--time=t", "--na=2", "--nb=2", "--format=json"]
+    words = ["fit", "a.csv", "b.csv", "--time=t", "--model=arx", "--na=2", "--nb=2", "--nk=1", "--format=json"]
     with pytest.warns(th.EstimationWarning, match="gaps in the clock"):
         model = th.arx(th.read_csv(["a.csv", "b.csv"], time="t"), 2, 2)
     assert model.to_json() == program(folder, *words)
-    words = ["fit", "a.csv", "--time=t", "--resample=0.01:linear", "--na=2", "--nb=2", "--format=json"]
+    words = ["fit", "a.csv", "--time=t", "--resample=0.01:linear", "--model=arx", "--na=2", "--nb=2", "--nk=1", "--format=json"]
     assert th.arx(th.read_csv("a.csv", time="t", resample=(0.01, "linear")), 2, 2).to_json() == program(folder, *words)
     joined = th.Log.join([th.read_csv("a.csv", time="t"), th.read_csv("b.csv", time="t")])
     assert joined == th.read_csv(["a.csv", "b.csv"], time="t")

@@ -144,7 +144,7 @@ def test_a_fit_is_a_model_with_every_method(tmp_path: Path) -> None:
     assert model.validate(log, rows="1..300").document["in_sample"] == "yes"
     assert model.validate(log[:300]).document["in_sample"] == "yes"
     model.write_html(tmp_path / "page.html", log)
-    assert "change of variable" in (tmp_path / "page.html").read_text()
+    assert "estimated as" in (tmp_path / "page.html").read_text()
     assert th.compare({"tank": model, "arx": th.arx(log, na=1, nb=1, estimate="1..300")}, log).document["criteria"] is not None
     again = th.Model.from_json(model.to_json())
     assert again.to_json() == model.to_json() == pickle.loads(pickle.dumps(model)).to_json()

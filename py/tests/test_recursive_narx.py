@@ -129,7 +129,7 @@ def test_a_tracker_takes_products_and_fitted_functions() -> None:
     warm.run(log[300:])
     assert len(warm.parameter_names) == 4
     for options, message in [
-        ({"narx": "rbf"}, "warm"),
+        ({"narx": "rbf"}, "narx: 'rbf' is none of poly"),
         ({"narx": "poly", "na": 2}, "na|narx"),
         ({"degree": 2}, "degree"),
         ({"narx": "poly", "constant": True}, "constant"),

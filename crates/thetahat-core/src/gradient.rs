@@ -1,5 +1,5 @@
-//! Gradients of predictions: regressors that go through 1/C(q), for polynomials C that change from sample to sample, and
-//! stay stable.
+//! Gradients of predictions: regressors that go through 1/C(q), for polynomials C that change from sample to sample,
+//! and stay stable.
 
 use core::ops::{Range, RangeInclusive};
 

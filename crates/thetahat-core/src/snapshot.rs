@@ -54,8 +54,8 @@ impl<'de> Deserialize<'de> for SnapshotVersion {
     }
 }
 
-/// The snapshot of a type: its version, then these fields of the type, each as its attribute says. After an arrow stands
-/// of which field another value is made, and how.
+/// The snapshot of a type: its version, then these fields of the type, each as its attribute says. After an arrow
+/// stands of which field another value is made, and how.
 macro_rules! snapshot {
     (
         $snapshot:ident<$($argument:ident),+> of $type:ident<$($of:ident),+> where [$($bounds:tt)+] {

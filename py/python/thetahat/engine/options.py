@@ -188,7 +188,7 @@ class ReadOptions(TypedDict, total=False):
     encoding: Optional[str]
     sheet: Optional[str]
     decimal_comma: Optional[bool]
-    header: Optional[Union[bool, int]]
+    header: Union[bool, int]
     skip_rows: Optional[int]
     missing: Optional[Union[str, Sequence[str]]]
     values: Optional[Mapping[str, float]]

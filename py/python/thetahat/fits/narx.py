@@ -85,4 +85,6 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
     >>> sorted(model.parameter_names)
     ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
     """
+    if map == "none":
+        raise ValueError("map: narx fits a nonlinear model; name its functions, or fit a linear one")
     return fitted(log, {"narx": map, "ny": ny, "nu": nu, "nk": nk}, options)

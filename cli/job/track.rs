@@ -5,7 +5,6 @@ use thetahat::model::{Map, Model, Orders, Signal};
 use thetahat::report::Report;
 use thetahat::track::{PerChannel, Policy, TrackMethod, TrackPlan, Tracker};
 
-use super::fit::named_values;
 use super::{LineJob, LogJob, parsed};
 use crate::args::{Names, ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
 use crate::failure::Failure;
@@ -361,4 +360,23 @@ impl Given {
         Orders::new(self.na.unwrap_or(0), &nb, self.nc.unwrap_or(0), 0, &vec![0; inputs], &nk)
             .map_err(|error| Failure::option(&error))
     }
+}
+
+/// Numbers set by hand, one for a channel.
+fn named_values(option: &str, texts: &[String]) -> Result<Vec<(String, f64)>, Failure> {
+    let mut values: Vec<(String, f64)> = Vec::new();
+    for text in texts {
+        let (name, value) = text
+            .rsplit_once('=')
+            .and_then(|(name, value)| Some((name.to_owned(), value.trim().parse::<f64>().ok()?)))
+            .filter(|(_, value)| value.is_finite())
+            .ok_or_else(|| {
+                Failure::usage(format!("{option} {text}: write it as NAME=VALUE, such as u=4.5"))
+            })?;
+        if values.iter().any(|(other, _)| *other == name) {
+            return Err(Failure::usage(format!("{option}: '{name}' has two; give one")));
+        }
+        values.push((name, value));
+    }
+    Ok(values)
 }

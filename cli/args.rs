@@ -36,16 +36,14 @@ pub(crate) use fit::FitArguments;
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};
 pub(crate) use log::{ClockArguments, LiveClockArguments, LogArguments, Names};
-pub(crate) use options::FitOptionArguments;
+pub(crate) use options::OptionArguments;
 pub(crate) use reduce::ReduceArguments;
 pub(crate) use respond::{
     BodeArguments, PredictArguments, RespondArguments, SimulateArguments, StartArgument, TransientArguments,
 };
-pub(crate) use spectrum::{
-    EstimatorOfSpectraArgument, ResponseFormatArgument, SpectrumArguments, SpectrumMethodArgument,
-};
+pub(crate) use spectrum::{ResponseFormatArgument, SpectrumArguments};
 pub(crate) use step::StepArguments;
-pub(crate) use track::{ResumeArgument, TrackArguments, TrackMethodArgument, TrackModelArgument};
+pub(crate) use track::{ResumeArgument, TrackArguments};
 pub(crate) use tune::{ControllerArgument, TuneArguments};
 pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
 

@@ -1,26 +1,17 @@
-//! The stages of the program for a binding to another language. Options are those of the command line and mean the
+//! How the program reads files, for a binding to another language. Options are those of the command line and mean the
 //! same; nothing is printed, and nothing is drawn on a terminal.
 
 use std::ffi::OsString;
 use std::path::Path;
 
 use clap::Args;
-use thetahat::control::Control;
 use thetahat::data::{Log, Source};
-use thetahat::design::{ExperimentDesign, SignalPlan};
 use thetahat::inspect::{Inspection, TopicList};
-use thetahat::model::Model;
-use thetahat::report::{Report, Requirement, ValidationPlan};
-use thetahat::spectrum::SpectrumPlan;
-use thetahat::step_test::StepTestPlan;
-use thetahat::tune::Tuning;
 
-use crate::args::{ControlArguments, DesignArguments, InspectArguments, TuneArguments, ValidateArguments};
-use crate::commands::{
-    Experiments, Tracking, compared_signals, designed, experiments, inspected, plan, settings,
-};
+use crate::args::InspectArguments;
+use crate::commands::{Experiments, experiments, inspected, plan};
 use crate::failure::Failure;
-use crate::job::{DesignJob, EvaluationJob, FitJob, InspectJob, SpectrumJob, StepTestJob, control_plan};
+use crate::job::{FitJob, InspectJob};
 use crate::log;
 use crate::replace::replace;
 
@@ -51,19 +42,6 @@ pub fn read(options: &[OsString], uniform: bool) -> Result<Opened, Failure> {
     Ok(Opened { log, sources, inputs: channels.inputs, outputs: channels.outputs, warnings })
 }
 
-/// How `thetahat validate` evaluates a model with these options, and what it requires.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn validation_plan(options: &[OsString]) -> Result<(ValidationPlan, Vec<Requirement>), Failure> {
-    let files = ["report", "log"].map(OsString::from);
-    let words: Vec<OsString> = options.iter().cloned().chain(files).collect();
-    let arguments: ValidateArguments = arguments("validate", &words)?;
-    let mut job = EvaluationJob::resolve(&arguments.evaluation, &[])?;
-    let requirements = job.requirements(&arguments.require)?;
-    Ok((job.plan, requirements))
-}
-
 /// What `thetahat inspect` says of a file with these options.
 ///
 /// # Errors
@@ -89,89 +67,6 @@ pub fn topic_list(options: &[OsString]) -> Result<TopicList, Failure> {
             job.path.display()
         ))
     })
-}
-
-/// The plan that `thetahat spectrum` makes of these options for a log with these channels.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn spectrum_plan(
-    options: &[OsString],
-    inputs: Vec<String>,
-    output: String,
-) -> Result<SpectrumPlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    SpectrumJob::resolve(&arguments("spectrum", &words)?)?.plan(inputs, output)
-}
-
-/// The plan that `thetahat step` makes of these options for a log with these channels.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn step_test_plan(options: &[OsString], input: String, output: String) -> Result<StepTestPlan, Failure> {
-    let log = OsString::from("log");
-    let words: Vec<OsString> = options.iter().cloned().chain([log]).collect();
-    Ok(StepTestJob::resolve(&arguments("step", &words)?)?.plan(input, output))
-}
-
-/// What `thetahat tune` says of a model with these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn tuning_of(options: &[OsString], model: &Model) -> Result<Tuning, Failure> {
-    let report = OsString::from("model");
-    let words: Vec<OsString> = options.iter().cloned().chain([report]).collect();
-    let arguments: TuneArguments = arguments("tune", &words)?;
-    settings(&arguments, model, Path::new("model"))
-}
-
-/// What `thetahat control` says of a model with these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn controller_of(options: &[OsString], model: &Model) -> Result<Control, Failure> {
-    let report = OsString::from("model");
-    let words: Vec<OsString> = options.iter().cloned().chain([report]).collect();
-    let arguments: ControlArguments = arguments("control", &words)?;
-    designed(&control_plan(&arguments)?, model, Path::new("model"))
-}
-
-/// The signal that `thetahat design` makes with these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn signal_plan(options: &[OsString]) -> Result<SignalPlan, Failure> {
-    Ok(DesignJob::resolve(&arguments("design", options)?)?.plan())
-}
-
-/// What `thetahat design --for` says of a model with these options.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn compare_signals(options: &[OsString], model: &Model) -> Result<ExperimentDesign, Failure> {
-    // The name stands for the model in messages.
-    let words: Vec<OsString> = options.iter().cloned().chain([OsString::from("--for=model")]).collect();
-    let arguments: DesignArguments = arguments("design", &words)?;
-    compared_signals(&arguments, &DesignJob::resolve(&arguments)?, model, Path::new("model"))
-}
-
-/// What `thetahat track` does with these options, in memory, for a log with these channels. `report` is where it starts
-/// from.
-///
-/// # Errors
-/// A [`Failure`] as the program would report it.
-pub fn track(
-    options: &[OsString],
-    inputs: Vec<String>,
-    outputs: Vec<String>,
-    report: Option<&Report>,
-) -> Result<Tracking, Failure> {
-    // The name stands for the report in messages.
-    let warm = report.map(|_| "--warm=warm");
-    let words: Vec<OsString> =
-        options.iter().cloned().chain(warm.into_iter().chain(["log"]).map(OsString::from)).collect();
-    Tracking::new(&arguments("track", &words)?, inputs, outputs, report)
 }
 
 /// Writes a file as the program does: whole, or not at all.

@@ -26,15 +26,12 @@ mod transient;
 mod tune;
 mod validate;
 
-pub(crate) use control::designed;
-pub(crate) use design::compared_signals;
 pub use each::Journal;
 pub(crate) use experiments::{Experiments, experiments};
 pub use filter::consistency;
 pub(crate) use inspect::inspected;
 pub(crate) use stored::plan;
 pub use track::{TrackedRow, Tracking};
-pub(crate) use tune::settings;
 
 use crate::args::{Arguments, Command};
 use crate::failure::Failure;

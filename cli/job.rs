@@ -1,7 +1,6 @@
 //! What a command line means: everything resolved and checked that needs no data.
 
 mod control;
-mod design;
 mod filter;
 mod fit;
 mod inspect;
@@ -26,7 +25,6 @@ use crate::line_writer::Format;
 use crate::memory::PerValue;
 
 pub(crate) use control::control_plan;
-pub(crate) use design::DesignJob;
 pub(crate) use filter::FilterJob;
 pub(crate) use fit::FitJob;
 pub(crate) use inspect::InspectJob;

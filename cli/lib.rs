@@ -41,10 +41,7 @@ use clap::Parser;
 use messages::{say, tell};
 use thetahat::text;
 
-pub use binding::{
-    Opened, compare_signals, controller_of, inspect, read, signal_plan, spectrum_plan, step_test_plan,
-    topic_list, track, tuning_of, validation_plan, write,
-};
+pub use binding::{Opened, inspect, read, topic_list, write};
 pub use commands::demo::LOG as DEMO_LOG;
 pub use commands::{Journal, TrackedRow, Tracking, consistency};
 pub use failure::{Failure, Kind};

@@ -2,36 +2,37 @@
 //!
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
-use thetahat::plan::FIT_OPTIONS;
+use thetahat::design::DesignOptions;
+use thetahat::options::{OptionRow, Options};
+use thetahat::plan::FitOptions;
+use thetahat::report::ValidationOptions;
+use thetahat::spectrum::SpectrumOptions;
+use thetahat::track::TrackOptions;
 
-/// The arguments of the libraries that are options, by the name that both have, beside those of a fit.
-pub(crate) const OPTIONS: [&str; 61] = [
-    "alarm",
-    "alpha",
-    "alphas",
-    "band",
+/// The tables of options.
+const TABLES: [&[OptionRow]; 5] = [
+    FitOptions::TABLE,
+    DesignOptions::TABLE,
+    SpectrumOptions::TABLE,
+    TrackOptions::TABLE,
+    ValidationOptions::TABLE,
+];
+
+/// The arguments of the libraries that are options, by the name that both have, beside those in a table.
+pub(crate) const OPTIONS: [&str; 37] = [
     "cancel-zeros",
-    "channels",
     "comment",
-    "dead-zone",
     "decimal-comma",
     "delimiter",
-    "discard",
     "draws",
     "encoding",
-    "estimator",
-    "forgetting",
+    "for",
     "format",
-    "frequencies",
     "from",
     "gain",
     "grey",
-    "half-width",
     "header-row",
     "hold",
-    "horizon",
-    "lags",
-    "length",
     "limits",
     "lqr",
     "measurement-noise",
@@ -40,23 +41,13 @@ pub(crate) const OPTIONS: [&str; 61] = [
     "name",
     "no-header",
     "observer",
-    "outliers",
-    "period",
     "plan",
-    "points",
     "poles",
     "precision",
-    "range",
     "require",
     "resample",
-    "rms",
-    "rows",
-    "sample-time",
-    "scale",
     "sheet",
-    "signal",
     "skip-rows",
-    "start",
     "stream",
     "time",
     "time-format",
@@ -64,9 +55,8 @@ pub(crate) const OPTIONS: [&str; 61] = [
     "time-zone",
     "to",
     "value",
-    "want",
+    "warm",
     "what",
-    "window",
 ];
 
 /// The option that an argument is, if it is one.
@@ -76,8 +66,8 @@ pub(crate) fn option_of(argument: &str) -> Option<&str> {
         "bounds" => Some("bound"),
         "delays" => Some("nk"),
         name => {
-            let of_fit = || FIT_OPTIONS.iter().any(|option| option.name() == name);
-            (OPTIONS.contains(&name) || of_fit()).then_some(name)
+            let in_a_table = || TABLES.iter().any(|table| table.iter().any(|option| option.name() == name));
+            (OPTIONS.contains(&name) || in_a_table()).then_some(name)
         }
     }
 }

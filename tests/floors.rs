@@ -50,6 +50,7 @@ const LIBRARY: House = House {
     floors: &[
         &["document", "optimize"],
         &["data"],
+        &["options"],
         &["model"],
         &["respond"],
         &["estimate"],

@@ -447,7 +447,7 @@ fn several_outputs_are_refused_where_a_model_has_one() {
         (2, "-y y1,y2 --na 1 --nb 1 --nc 1", "--nc: several outputs are tracked as ARX"),
         (2, "-y y1,y2 --narx poly", "--narx: several outputs"),
         (2, "-y y1,y1 --na 1 --nb 1", "'y1' is named twice"),
-        (2, "-y y1 --na 1 --nb 1 --couple full", "--couple is for several outputs"),
+        (2, "-y y1 --na 1 --nb 1 --couple full", "--couple: it is for several outputs"),
         (2, "-y y1,y2 --na 1 --nb 1 --couple auto", "'auto' is neither full nor none"),
         (2, "-y y1,y2 --na 1 --nb 1 --scale y1=1", "has none; give one for each channel"),
         (2, "-y y1,y2 --warm one.json", "--output: 2 of the 1 outputs of --warm"),
@@ -508,7 +508,7 @@ fn bad_options_and_logs_are_refused() {
     let usage = |line: &str| refused(&folder, &format!("log.csv {line}"), 2);
     for (line, words) in [
         ("", "the orders are missing: give --na and --nb, or --warm"),
-        ("--na 2", "--nb is missing"),
+        ("--na 2", "--nb: missing: give it"),
         ("--nb 1,2", "--nb: 2 values for 1 inputs"),
         ("--nb 1 --forgetting 0.2", "--forgetting: "),
         ("--nb 1 --forgetting fast", "--forgetting: 'fast' is no policy"),
@@ -518,7 +518,7 @@ fn bad_options_and_logs_are_refused() {
         ("--nb 1 --scale u=1", "--scale: 'y' has none"),
         ("--nb 1 --scale x=1 --scale u=1 --scale y=1", "--scale: 'x' is no channel"),
         ("--nb 1 --offset u", "--offset u: write it as NAME=VALUE"),
-        ("--nb 1 --model armax", "--model armax needs --nc"),
+        ("--nb 1 --model armax", "--model: armax needs --nc"),
         ("--nb 1 --nc 1 --model arx", "--nc: an arx model has no C"),
         ("--nb 1 --dead-zone -1", "--dead-zone: "),
         ("--nb 1 --scale u=0 --scale y=1", "--scale u=0: give the typical magnitude"),

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use thetahat::plan::FitOptions;
 
-use super::{ClockArguments, EachArguments, FitOptionArguments, FormatArgument, LogArguments};
+use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, OptionArguments};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct FitArguments {
@@ -21,7 +22,7 @@ pub(crate) struct FitArguments {
     pub(crate) from: Option<PathBuf>,
 
     #[command(flatten)]
-    pub(crate) options: FitOptionArguments,
+    pub(crate) options: OptionArguments<FitOptions>,
     /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by
     /// name, the clock may be irregular
     #[arg(long, value_name = "MODEL", help_heading = "Model", conflicts_with = "from")]

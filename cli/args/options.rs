@@ -1,23 +1,35 @@
-//! The options of a fit as arguments: each is a row of the library's table.
+//! Options as arguments: each is a row of a table of the library.
+
+use std::marker::PhantomData;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use serde_json::{Map, Value};
-use thetahat::plan::{FIT_OPTIONS, FitOption, FitOptions, Form};
+use thetahat::options::{Form, OptionRow, Options};
 
 use super::Names;
 use crate::failure::Failure;
 use crate::options::with_options;
 
 /// Values of these may begin with a hyphen.
-const MAY_BE_NEGATIVE: [&str; 11] = [
+const MAY_BE_NEGATIVE: [&str; 21] = [
+    "alarm",
+    "alpha",
+    "alphas",
+    "band",
     "dc_gain",
+    "dead_zone",
+    "frequencies",
+    "horizon",
     "noise_bound",
     "norm",
     "prefilter",
+    "range",
     "regressor",
     "ridge",
+    "rms",
+    "sample_time",
     "split",
     "step",
     "time_limit",
@@ -25,20 +37,20 @@ const MAY_BE_NEGATIVE: [&str; 11] = [
     "width",
 ];
 
-/// Those that were given, as JSON.
+/// Those of a table that were given, as JSON.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct FitOptionArguments(Map<String, Value>);
+pub(crate) struct OptionArguments<O>(Map<String, Value>, PhantomData<O>);
 
-impl FitOptionArguments {
+impl<O: Options> OptionArguments<O> {
     /// Them as the library has them.
-    pub(crate) fn options(&self) -> Result<FitOptions, Failure> {
-        FitOptions::of(&self.0).map_err(|error| Failure::option(&error))
+    pub(crate) fn options(&self) -> Result<O, Failure> {
+        O::of(&self.0).map_err(|error| Failure::option(&error))
     }
 }
 
-impl Args for FitOptionArguments {
+impl<O: Options> Args for OptionArguments<O> {
     fn augment_args(command: Command) -> Command {
-        FIT_OPTIONS.iter().fold(command, |command, option| command.arg(argument(option)))
+        O::TABLE.iter().fold(command, |command, option| command.arg(argument(option)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -46,13 +58,13 @@ impl Args for FitOptionArguments {
     }
 }
 
-impl FromArgMatches for FitOptionArguments {
+impl<O: Options> FromArgMatches for OptionArguments<O> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let given = |option: &&FitOption| {
+        let given = |option: &&OptionRow| {
             matches.value_source(option.field).is_some_and(|source| source == ValueSource::CommandLine)
         };
-        let all = FIT_OPTIONS.iter().filter(given);
-        Ok(Self(all.map(|option| (option.field.to_owned(), value(matches, option))).collect()))
+        let all = O::TABLE.iter().filter(given);
+        Ok(Self(all.map(|option| (option.field.to_owned(), value(matches, option))).collect(), PhantomData))
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -61,16 +73,21 @@ impl FromArgMatches for FitOptionArguments {
     }
 }
 
-fn argument(option: &FitOption) -> Arg {
+fn argument(option: &OptionRow) -> Arg {
     let mut help = with_options(option.help.trim());
     if !option.default.is_empty() {
         help.push_str(&format!(" [default: {}]", with_options(option.default)));
     }
-    let own =
-        Arg::new(option.field).long(option.name()).help(help).help_heading(with_options(option.heading));
+    let own = Arg::new(option.field).long(option.name()).help(help);
+    let own = match option.heading {
+        "" => own,
+        heading => own.help_heading(with_options(heading)),
+    };
     let own = match option.field {
         "input" => own.short('u'),
         "output" => own.short('y'),
+        "length" => own.short('n'),
+        "signal" => own.short('s'),
         _ => own,
     };
     let words = (option.words)();
@@ -92,7 +109,7 @@ fn argument(option: &FitOption) -> Arg {
 }
 
 /// The value of an option that was given.
-fn value(matches: &ArgMatches, option: &FitOption) -> Value {
+fn value(matches: &ArgMatches, option: &OptionRow) -> Value {
     let texts = || matches.get_many::<String>(option.field).into_iter().flatten().cloned();
     match option.form {
         Form::Flag => Value::Bool(true),

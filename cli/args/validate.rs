@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use thetahat::report::ValidationOptions;
 
-use super::{ClockArguments, EachArguments, FormatArgument, LogArguments};
+use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, OptionArguments};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ValidateArguments {
@@ -46,43 +47,8 @@ pub(crate) struct CompareArguments {
 /// What validate and compare share.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EvaluationArguments {
-    /// Rows to validate on, 1-based and inclusive [default: all]
-    #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',')]
-    pub(crate) rows: Vec<String>,
-    /// Offsets: the model's own, or none, mean, linear, start:K of the rows evaluated
-    #[arg(long, default_value = "model", value_name = "WHAT")]
-    pub(crate) detrend: String,
-    /// Prediction horizons besides 1, in steps
-    #[arg(
-        long,
-        value_name = "K[,K…]",
-        default_value = "5",
-        value_delimiter = ',',
-        allow_hyphen_values = true
-    )]
-    pub(crate) horizon: Vec<String>,
-    /// Lags of the tests of residuals; short logs have fewer
-    #[arg(long, value_name = "L", default_value_t = 25, help_heading = "Tests")]
-    pub(crate) lags: usize,
-    /// Reject where less than this chance is left
-    #[arg(
-        long,
-        value_name = "LEVEL",
-        default_value_t = 0.05,
-        allow_hyphen_values = true,
-        help_heading = "Tests"
-    )]
-    pub(crate) alpha: f64,
-    /// The levels of the bands of which Anderson's test counts what lies outside
-    #[arg(
-        long,
-        value_name = "LEVEL[,LEVEL…]",
-        value_delimiter = ',',
-        default_value = "0.01,0.02,0.05,0.1,0.2",
-        allow_hyphen_values = true,
-        help_heading = "Tests"
-    )]
-    pub(crate) alphas: Vec<f64>,
+    #[command(flatten)]
+    pub(crate) options: OptionArguments<ValidationOptions>,
     /// What to print: a table for people, or the JSON document
     #[arg(long, value_enum, default_value = "table", help_heading = "Output")]
     pub(crate) format: FormatArgument,

@@ -18,7 +18,7 @@ pub(crate) fn compare(arguments: &CompareArguments, line: &str) -> Result<(), Fa
     let evaluation = &arguments.evaluation;
     let read: Vec<_> =
         arguments.reports.iter().chain([&arguments.path]).chain(&arguments.over).cloned().collect();
-    let job = EvaluationJob::resolve(evaluation, &read)?;
+    let job = EvaluationJob::resolve(evaluation, &[], &read)?;
     let reports: Vec<Report> =
         arguments.reports.iter().map(|path| stored::report(path)).collect::<Result<_, _>>()?;
     let loaded = loaded(&arguments.path, &job, &reports.iter().collect::<Vec<_>>(), &Telling::Aloud)?;

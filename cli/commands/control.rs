@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use thetahat::control::{Control, ControlPlan, control as controlled};
-use thetahat::model::Model;
+use thetahat::control::{Control, control as controlled};
 use thetahat::present::tables;
 
 use super::{closed_loop, stored};
@@ -15,13 +14,9 @@ use crate::output;
 pub(crate) fn control(arguments: &ControlArguments) -> Result<(), Failure> {
     // What is wrong with an option is said before anything is read.
     let plan = control_plan(arguments)?;
-    let found = designed(&plan, &stored::model(&arguments.report)?, &arguments.report)?;
+    let found = controlled(&stored::model(&arguments.report)?, &plan)
+        .map_err(|error| Failure::about(&error, |_| arguments.report.display().to_string()))?;
     closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, tables::control)
-}
-
-/// The controller for a model, which messages name by a path.
-pub(crate) fn designed(plan: &ControlPlan, model: &Model, name: &Path) -> Result<Control, Failure> {
-    controlled(model, plan).map_err(|error| Failure::about(&error, |_| name.display().to_string()))
 }
 
 /// A row for each time.

@@ -3,23 +3,21 @@
 use std::path::Path;
 
 use thetahat::Document;
-use thetahat::design::{ExperimentDesign, SignalFigures, SignalPlan, TestSignal, compare_signals};
-use thetahat::model::Model;
+use thetahat::design::{DesignOptions, SignalFigures, SignalPlan, TestSignal, compare_signals};
 use thetahat::present::tables;
 
 use super::stored;
 use crate::args::{DesignArguments, FormatArgument};
 use crate::failure::Failure;
-use crate::job::DesignJob;
 use crate::messages::tell;
 use crate::output;
 use crate::wrap::layout_of;
 
 pub(crate) fn design(arguments: &DesignArguments) -> Result<(), Failure> {
-    let job = DesignJob::resolve(arguments)?;
+    let options = arguments.options.options()?;
     match &arguments.model {
-        None => signal(arguments, &job.plan()),
-        Some(report) => compare(arguments, &job, report),
+        None => signal(arguments, &options.signal_plan().map_err(|error| Failure::option(&error))?),
+        Some(report) => compare(arguments, &options, report),
     }
 }
 
@@ -56,8 +54,12 @@ fn signal(arguments: &DesignArguments, plan: &SignalPlan) -> Result<(), Failure>
 }
 
 /// Writes what several signals are worth for a model.
-fn compare(arguments: &DesignArguments, job: &DesignJob, report: &Path) -> Result<(), Failure> {
-    let found = compared_signals(arguments, job, &stored::model(report)?, report)?;
+fn compare(arguments: &DesignArguments, options: &DesignOptions, report: &Path) -> Result<(), Failure> {
+    let model = stored::model(report)?;
+    let polynomials = stored::polynomials(report, &model, "the plan of an experiment")?;
+    let plans = options.signal_plans(&model).map_err(|error| Failure::option(&error))?;
+    let found = compare_signals(polynomials, &plans, &options.want)
+        .map_err(|error| Failure::about(&error, |_| report.display().to_string()))?;
     // What goes into a file does not depend on the terminal.
     let layout = layout_of(&arguments.out);
     let text = match arguments.format {
@@ -65,19 +67,6 @@ fn compare(arguments: &DesignArguments, job: &DesignJob, report: &Path) -> Resul
         FormatArgument::Table => tables::experiment_design(&found, layout),
     };
     output::write(&arguments.out, |file| file.write_all(text.as_bytes()))
-}
-
-/// What several signals are worth for a model, which messages name by a path.
-pub(crate) fn compared_signals(
-    arguments: &DesignArguments,
-    job: &DesignJob,
-    model: &Model,
-    name: &Path,
-) -> Result<ExperimentDesign, Failure> {
-    let polynomials = stored::polynomials(name, model, "the plan of an experiment")?;
-    let plans = job.plans(arguments, model)?;
-    compare_signals(polynomials, &plans, &job.wants)
-        .map_err(|error| Failure::about(&error, |_| name.display().to_string()))
 }
 
 /// u, or u1, u2, …: what fits take for inputs.

@@ -6,6 +6,7 @@ use thetahat::control::Control;
 use thetahat::design::ExperimentDesign;
 use thetahat::filter::FilterSummary;
 use thetahat::inspect::{Inspection, TopicList};
+use thetahat::options::Options;
 use thetahat::plan::FitOptions;
 use thetahat::report::{Comparison, NormalEquations, Report, Validation};
 use thetahat::spectrum::MeasuredResponse;
@@ -32,7 +33,7 @@ pub(crate) fn schema(document: DocumentArgument) -> Result<(), Failure> {
         DocumentArgument::Track => TrackSummary::json_schema(),
         DocumentArgument::Filter => FilterSummary::json_schema(),
         DocumentArgument::Design => ExperimentDesign::json_schema(),
-        DocumentArgument::Plan => FitOptions::json_schema(),
+        DocumentArgument::Plan => FitOptions::schema(),
         DocumentArgument::NormalEquations => NormalEquations::json_schema(),
     };
     output::print(&format!("{schema:#}\n"))

@@ -40,8 +40,8 @@ pub(crate) fn spectrum(arguments: &SpectrumArguments, line: &str) -> Result<(), 
 /// Reads the logs and estimates the response.
 fn measured(job: &SpectrumJob) -> Result<MeasuredResponse, Failure> {
     let wanted = Wanted {
-        inputs: job.inputs.clone(),
-        outputs: job.output.iter().cloned().collect(),
+        inputs: job.options.inputs(),
+        outputs: job.options.output().into_iter().collect(),
         driven: true,
         none: "no inputs",
     };

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde_json::Value;
 use thetahat::Document;
 use thetahat::model::{LinearModel, Model, PolynomialModel};
+use thetahat::options::Options;
 use thetahat::plan::FitOptions;
 use thetahat::report::Report;
 use thetahat::spectrum::MeasuredResponse;
@@ -27,12 +28,21 @@ pub(super) fn polynomials<'m>(
     model: &'m Model,
     what: &str,
 ) -> Result<&'m PolynomialModel, Failure> {
-    model.polynomials(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
+    model.polynomials(what).map_err(|error| refused(path, error))
 }
 
 /// What a stored model is from its inputs to each output, if it is linear: `what` needs it to be.
 pub(super) fn linear<'m>(path: &Path, model: &'m Model, what: &str) -> Result<Vec<LinearModel<'m>>, Failure> {
-    model.linear(what).map_err(|error| Failure::data(format!("{}: {error}", path.display())))
+    model.linear(what).map_err(|error| refused(path, error))
+}
+
+/// What the library says of a stored model: the file stands for the argument.
+pub(super) fn refused(path: &Path, error: thetahat::Error) -> Failure {
+    let message = match error {
+        thetahat::Error::Argument { message, .. } => message,
+        other => other.to_string(),
+    };
+    Failure::data(format!("{}: {message}", path.display()))
 }
 
 /// A stored report.

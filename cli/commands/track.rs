@@ -104,7 +104,7 @@ impl<'a> Run<'a> {
         let mut chosen = None;
         let start = stored.as_ref().and_then(|state| state.start.as_deref());
         let (stream, warnings) = log::follow(&job.path, &job.log, job.state.is_some(), start, |header| {
-            let channels = channels::choose(job, report, header)
+            let channels = channels::choose(&job.options, report, header)
                 .map_err(|message| Failure::data(format!("{name}: {message}")))?;
             let names = channels.inputs.iter().chain(&channels.outputs).cloned().collect();
             chosen = Some(channels);
@@ -113,7 +113,14 @@ impl<'a> Run<'a> {
         let channels = chosen.unwrap_or_default();
         let trackers = job.trackers(&channels.inputs, &channels.outputs, report)?;
         let has_clock = stream.is_of_a_topic() || matches!(job.log.clock, Clock::Column { .. });
-        let setting = state::setting(job, &channels, &trackers);
+        let time = if let Clock::Column { name, .. } = &job.log.clock { name.as_str() } else { "" };
+        let lines = state::Lines {
+            time,
+            horizon: job.options.horizon,
+            every: job.lines.every,
+            format: job.lines.format,
+        };
+        let setting = state::setting(&lines, &channels, &trackers);
         let resumed = stored.is_some();
         let state = match stored {
             Some(state) => state.checked(&setting, &trackers, job)?,
@@ -128,7 +135,7 @@ impl<'a> Run<'a> {
                 )
             }
         };
-        let columns = Columns::new(has_clock, job.horizon, &state.outputs, &state.trackers);
+        let columns = Columns::new(has_clock, job.options.horizon, &state.outputs, &state.trackers);
         let place = match &job.state {
             Some(state_job) if resumed => Place::resumed(state_job.resume, &job.path),
             _ => Place::There,
@@ -245,7 +252,7 @@ impl<'a> Run<'a> {
         }
         if !self.job.lines.quiet {
             let layout = stderr_layout();
-            let watched = self.job.is_watched();
+            let watched = self.job.options.alarm.is_some();
             say(tables::tracking(&summary, &self.live.faults(), watched, layout).trim_end());
         }
         Ok(())

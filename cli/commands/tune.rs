@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use thetahat::model::Model;
 use thetahat::present::{tables, tuning_page};
 use thetahat::tune::{Controller, Tuning, TuningPlan, tune as tuned};
 
@@ -12,22 +11,9 @@ use crate::failure::Failure;
 use crate::output;
 
 pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure> {
-    let found = settings(arguments, &stored::model(&arguments.report)?, &arguments.report)?;
-    if let Some(path) = &arguments.html {
-        output::page(path, &tuning_page(&found, line))?;
-    }
-    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, tables::tuning)
-}
-
-/// The settings for a model, which messages name by a path.
-pub(crate) fn settings(arguments: &TuneArguments, model: &Model, name: &Path) -> Result<Tuning, Failure> {
-    let Some(process) = model.as_process() else {
-        return Err(Failure::data(format!(
-            "{}: it is {}, and settings are of a process: fit one (--structure p1d)",
-            name.display(),
-            model.name()
-        )));
-    };
+    let report = &arguments.report;
+    let model = stored::model(report)?;
+    let process = model.process("settings are").map_err(|error| stored::refused(report, error))?;
     let plan = TuningPlan {
         input: arguments.input.clone(),
         closed_loop_time: arguments.lambda,
@@ -36,7 +22,12 @@ pub(crate) fn settings(arguments: &TuneArguments, model: &Model, name: &Path) ->
             ControllerArgument::Pid => Controller::Pid,
         }),
     };
-    tuned(process, &plan).map_err(|error| Failure::about(&error, |_| name.display().to_string()))
+    let found =
+        tuned(process, &plan).map_err(|error| Failure::about(&error, |_| report.display().to_string()))?;
+    if let Some(path) = &arguments.html {
+        output::page(path, &tuning_page(&found, line))?;
+    }
+    closed_loop::write(&arguments.outputs, &found, &found.warnings, responses, tables::tuning)
 }
 
 /// A row for each setting and time.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use thetahat::Document;
 use thetahat::present::{tables, validation_page};
-use thetahat::report::{Report, Requirement, Validated, Validation, ValidationPlan, validate as validated};
+use thetahat::report::{Report, Validated, Validation, ValidationPlan, validate as validated};
 
 use super::each::{Done, each};
 use super::search::Telling;
@@ -21,17 +21,16 @@ use crate::wrap::stdout_layout;
 pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), Failure> {
     let evaluation = &arguments.evaluation;
     let read = [std::slice::from_ref(&arguments.report), &arguments.logs].concat();
-    let mut job = EvaluationJob::resolve(evaluation, &read)?;
+    let mut job = EvaluationJob::resolve(evaluation, &arguments.require, &read)?;
     job.log.quiet = arguments.each.each;
-    let requirements = job.requirements(&arguments.require)?;
     let log = (!arguments.each.each).then(|| only("validate", &arguments.logs)).transpose()?;
     let report = stored::report(&arguments.report)?;
     let refused = |error| Failure::option(&error);
-    requirements.iter().try_for_each(|requirement| requirement.check(&report)).map_err(refused)?;
+    job.requirements.iter().try_for_each(|requirement| requirement.check(&report)).map_err(refused)?;
     let Some(log) = log else {
         let common = of_many(arguments, &report)?;
         return each(&arguments.each, &arguments.logs, &common, |log| {
-            one_of_many(arguments, &report, &job, &requirements, log)
+            one_of_many(arguments, &report, &job, log)
         });
     };
 
@@ -46,20 +45,16 @@ pub(crate) fn validate(arguments: &ValidateArguments, line: &str) -> Result<(), 
         warn(warning);
     }
     print(evaluation, &json, || {
-        tables::validation(validation, &requirements, job.plan.alpha, stdout_layout())
+        tables::validation(validation, &job.requirements, job.plan.alpha, stdout_layout())
     })?;
 
-    unmet(&arguments.report, validation, &requirements, &job).map_or(Ok(()), Err)
+    unmet(&arguments.report, validation, &job).map_or(Ok(()), Err)
 }
 
 /// What is required and not met.
-fn unmet(
-    report: &Path,
-    validation: &Validation,
-    requirements: &[Requirement],
-    job: &EvaluationJob,
-) -> Option<Failure> {
-    let unmet = requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
+fn unmet(report: &Path, validation: &Validation, job: &EvaluationJob) -> Option<Failure> {
+    let unmet =
+        job.requirements.iter().filter_map(|requirement| requirement.unmet(validation, job.plan.alpha));
     let unmet: Vec<String> = unmet.collect();
     (!unmet.is_empty())
         .then(|| Failure::unmet(format!("{}: not met: {}", report.display(), unmet.join("; "))))
@@ -77,13 +72,12 @@ fn one_of_many(
     arguments: &ValidateArguments,
     report: &Report,
     job: &EvaluationJob,
-    requirements: &[Requirement],
     log: &Path,
 ) -> Result<Done, Failure> {
     let telling = Telling::Kept(RefCell::default());
     let loaded = loaded(log, job, &[report], &telling)?;
     let Validated { validation, .. } = one(&arguments.report, report, &loaded, &job.plan)?;
-    let unmet = unmet(&arguments.report, &validation, requirements, job);
+    let unmet = unmet(&arguments.report, &validation, job);
     Ok(Done::new(&validation, validation.row(), telling.kept(), &validation.warnings)?.with(unmet))
 }
 

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use thetahat::fit::FitDraft;
+use thetahat::options::Options;
 use thetahat::plan::{FitOptions, Fitted};
 
 use super::LogJob;

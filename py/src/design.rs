@@ -1,17 +1,21 @@
 //! Test signals for experiments, and what these are worth.
 
-use std::ffi::OsString;
 use std::sync::Arc;
 
 use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use thetahat::Document;
-use thetahat::design::{SignalFigures, TestSignal};
+use thetahat::control::{ControlPlan, Design};
+use thetahat::design::{DesignOptions, SignalFigures, TestSignal};
 use thetahat::present::tables;
+use thetahat::thetahat_core::nalgebra::Complex;
+use thetahat::tune::{Controller, TuningPlan};
 
 use crate::error;
 use crate::model::Model;
-use crate::work::{awaited, interruptible};
+use crate::plan::options;
+use crate::work::interruptible;
 
 /// An array of one dimension.
 type Column<'py> = Bound<'py, PyArray1<f64>>;
@@ -20,15 +24,16 @@ type Column<'py> = Bound<'py, PyArray1<f64>>;
 /// frequencies and densities.
 type Figures<'py> = (f64, f64, Option<f64>, usize, usize, Column<'py>, Column<'py>);
 
-/// The signal that `thetahat design` makes with these options: its channels, the figures of each, its period, the
+/// The signal that a plan asks for: its channels, the figures of each, its period, the
 /// frequencies of its sinusoids, and the seconds between samples.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "a tuple that the package takes apart at once")]
 pub(crate) fn design_signal<'py>(
     py: Python<'py>,
-    options: Vec<OsString>,
+    plan: &str,
 ) -> PyResult<(Vec<Column<'py>>, Vec<Figures<'py>>, Option<usize>, Column<'py>, f64)> {
-    let plan = thetahat_cli::signal_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let asked: DesignOptions = options(py, plan)?;
+    let plan = asked.signal_plan().map_err(|error| error::batch(py, error))?;
     let sample_time = plan.sample_time;
     let (signal, channels, figures) = interruptible(py, move |_| {
         let signal = TestSignal::new(&plan)?;
@@ -49,16 +54,19 @@ pub(crate) fn design_signal<'py>(
     Ok((channels.into_iter().map(column).collect(), told, signal.period(), frequencies, sample_time))
 }
 
-/// What several signals are worth for a model: the document that `thetahat design --for` writes, and its table.
+/// What the signals of a plan are worth for a model: the document that `thetahat design --for` writes, and its table.
 #[pyfunction]
 pub(crate) fn compare_signals(
     py: Python<'_>,
     model: &Bound<'_, Model>,
-    options: Vec<OsString>,
+    plan: &str,
 ) -> PyResult<(String, String)> {
+    let asked: DesignOptions = options(py, plan)?;
     let model = Arc::clone(model.get().model());
-    let found = awaited(py, move |_| thetahat_cli::compare_signals(&options, &model))?
-        .map_err(|failure| error::program(py, &failure))?;
+    let found = interruptible(py, move |_| {
+        let polynomials = model.polynomials("the plan of an experiment")?;
+        thetahat::design::compare_signals(polynomials, &asked.signal_plans(&model)?, &asked.want)
+    })?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, tables::experiment_design(&found, error::layout())))
 }
@@ -68,25 +76,59 @@ pub(crate) fn compare_signals(
 pub(crate) fn tune(
     py: Python<'_>,
     model: &Bound<'_, Model>,
-    options: Vec<OsString>,
+    input: Option<String>,
+    closed_loop_time: Option<f64>,
+    controller: Option<&str>,
 ) -> PyResult<(String, String)> {
+    let controller = match controller {
+        None => None,
+        Some("pi") => Some(Controller::Pi),
+        Some("pid") => Some(Controller::Pid),
+        Some(other) => {
+            return Err(PyValueError::new_err(format!("controller: '{other}' is neither 'pi' nor 'pid'")));
+        }
+    };
+    let plan = TuningPlan { input, closed_loop_time, controller };
     let model = Arc::clone(model.get().model());
-    let found = awaited(py, move |_| thetahat_cli::tuning_of(&options, &model))?
-        .map_err(|failure| error::program(py, &failure))?;
+    let found = interruptible(py, move |_| thetahat::tune::tune(model.process("settings are")?, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, tables::tuning(&found, error::layout())))
 }
 
-/// A controller for a model: the document that `thetahat control` writes, and its table.
+/// A controller for a model: the document that `thetahat control` writes, and its table. `aim` are the poles, or the
+/// weight of the input, each with its imaginary part; `channels` what it moves and holds; `flags` whether it integrates, and cancels zeros.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the package gives them by name")]
 pub(crate) fn control(
     py: Python<'_>,
     model: &Bound<'_, Model>,
-    options: Vec<OsString>,
+    design: &str,
+    aim: Vec<(f64, f64)>,
+    observer: Option<Vec<(f64, f64)>>,
+    channels: (Option<String>, Option<String>),
+    flags: (bool, bool),
+    limits: (f64, f64),
+    draws: usize,
 ) -> PyResult<(String, String)> {
+    let input_weight = aim.first().map_or(0.0, |weight| weight.0);
+    let complex = |poles: Vec<(f64, f64)>| poles.into_iter().map(|(re, im)| Complex::new(re, im)).collect();
+    let design = match design {
+        "poles" => Design::Poles(complex(aim)),
+        "lqr" => Design::Quadratic { input_weight },
+        _ => Design::MinimumVariance { input_weight },
+    };
+    let plan = ControlPlan {
+        input: channels.0,
+        output: channels.1,
+        observer: observer.map(complex),
+        integrator: flags.0,
+        cancel_zeros: flags.1,
+        limits: limits.0..=limits.1,
+        draws,
+        ..ControlPlan::new(design)
+    };
     let model = Arc::clone(model.get().model());
-    let found = awaited(py, move |_| thetahat_cli::controller_of(&options, &model))?
-        .map_err(|failure| error::program(py, &failure))?;
+    let found = interruptible(py, move |_| thetahat::control::control(&model, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, tables::control(&found, error::layout())))
 }

@@ -5,17 +5,19 @@ use std::sync::Arc;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use thetahat::data::Rows;
 use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::present::tables;
-use thetahat::report::{Report, Requirement, Validated};
-use thetahat::spectrum::MeasuredResponse;
-use thetahat::step_test::StepTest;
+use thetahat::report::{Report, Requirement, Validated, ValidationPlan};
+use thetahat::spectrum::{MeasuredResponse, SpectrumPlan};
+use thetahat::step_test::{StepTest, StepTestPlan};
 use thetahat::{Document, is_document};
 
 use crate::error;
 use crate::journal::{Cells, cells};
 use crate::log::Log;
 use crate::model::Model;
+use crate::plan::options;
 use crate::work::{awaited, interruptible};
 
 /// How a model does on a log: the document that `thetahat validate` writes.
@@ -27,16 +29,22 @@ pub(crate) struct Validation {
     alpha: f64,
 }
 
-/// Evaluates a model on a log, with the options of `thetahat validate`.
+/// Evaluates a model on a log, with the options of a plan.
 #[pyfunction]
 pub(crate) fn validate(
     py: Python<'_>,
     model: &Bound<'_, Model>,
     log: &Bound<'_, Log>,
-    options: Vec<OsString>,
+    plan: &str,
+    required: Vec<String>,
 ) -> PyResult<Validation> {
-    let (plan, requirements) =
-        thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let requirements: Vec<Requirement> = required
+        .iter()
+        .map(|text| text.parse())
+        .collect::<Result<_, _>>()
+        .map_err(|error| error::batch(py, error))?;
+    let plan =
+        ValidationPlan::of(&options(py, plan)?, &requirements).map_err(|error| error::batch(py, error))?;
     let log = log.get();
     let report = model.get().report(py)?;
     for requirement in &requirements {
@@ -72,11 +80,10 @@ pub(crate) fn compare(
     py: Python<'_>,
     models: Vec<(String, Bound<'_, Model>)>,
     log: &Bound<'_, Log>,
-    options: Vec<OsString>,
+    plan: &str,
     over: Option<&str>,
 ) -> PyResult<(String, String)> {
-    let (plan, _) =
-        thetahat_cli::validation_plan(&options).map_err(|failure| error::program(py, &failure))?;
+    let plan = ValidationPlan::of(&options(py, plan)?, &[]).map_err(|error| error::batch(py, error))?;
     let over = over.map(MeasuredResponse::from_json).transpose().map_err(|error| error::batch(py, error))?;
     let log = log.get();
     let models = models.into_iter().map(|(name, model)| Ok((name, model.get().report(py)?)));
@@ -149,32 +156,28 @@ pub(crate) fn row<'py>(py: Python<'py>, text: &str) -> PyResult<Cells<'py>> {
     cells(py, &row)
 }
 
-/// The frequency response that a log shows, with the options of `thetahat spectrum`: the document that it writes, and
-/// its table.
+/// The frequency response that a log shows, with the options of a plan: the document that `thetahat spectrum` writes,
+/// and its table.
 #[pyfunction]
-pub(crate) fn spectrum(
-    py: Python<'_>,
-    log: &Bound<'_, Log>,
-    options: Vec<OsString>,
-) -> PyResult<(String, String)> {
+pub(crate) fn spectrum(py: Python<'_>, log: &Bound<'_, Log>, plan: &str) -> PyResult<(String, String)> {
     let log = log.get();
     let [output] = log.outputs.as_slice() else {
         return Err(PyValueError::new_err("log: a response is to one output; give a log of one"));
     };
-    let plan = thetahat_cli::spectrum_plan(&options, log.inputs.clone(), output.clone())
-        .map_err(|failure| error::program(py, &failure))?;
+    let plan = SpectrumPlan::of(&options(py, plan)?, log.inputs.clone(), output.clone())
+        .map_err(|error| error::batch(py, error))?;
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let found = interruptible(py, move |_| thetahat::spectrum::spectrum(&log, &sources, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, tables::response(&found, error::layout())))
 }
 
-/// What the steps of a log show, with the options of `thetahat step`: the document that it writes, and its table.
+/// What the steps of some rows of a log show: the document that `thetahat step` writes, and its table.
 #[pyfunction]
 pub(crate) fn step_test(
     py: Python<'_>,
     log: &Bound<'_, Log>,
-    options: Vec<OsString>,
+    rows: Vec<String>,
 ) -> PyResult<(String, String)> {
     let log = log.get();
     let ([input], [output]) = (log.inputs.as_slice(), log.outputs.as_slice()) else {
@@ -182,8 +185,12 @@ pub(crate) fn step_test(
             "log: a step test has one input and one output; take them with log.select(inputs=..., output=...)",
         ));
     };
-    let plan = thetahat_cli::step_test_plan(&options, input.clone(), output.clone())
-        .map_err(|failure| error::program(py, &failure))?;
+    let rows: Vec<Rows> = rows
+        .iter()
+        .map(|text| text.parse())
+        .collect::<Result<_, _>>()
+        .map_err(|error| error::batch(py, error))?;
+    let plan = StepTestPlan { rows, ..StepTestPlan::new(input, output) };
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let found = interruptible(py, move |_| thetahat::step_test::step_test(&log, &sources, &plan))?;
     step_document(py, &found)

@@ -1,14 +1,12 @@
 //! Models that are estimated along a log: the state and the document of `thetahat track`.
 
-use std::ffi::OsString;
-
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use thetahat::Document;
 use thetahat::present::tables;
-use thetahat::track::PerChannel;
+use thetahat::track::{PerChannel, TrackOptions};
 use thetahat_cli::{Failure, TrackedRow, Tracking};
 
 use crate::array::{matrix, vector};
@@ -19,6 +17,7 @@ use crate::online::detector::Alarm;
 use crate::online::forgetting::Memory;
 use crate::online::innovation::{code, names};
 use crate::online::results::Results;
+use crate::plan::options;
 use crate::work::Pulse;
 
 /// A way to forget as the command line writes it.
@@ -43,20 +42,25 @@ const COLUMNS: [&str; 8] =
 #[pymethods]
 #[pyo3(crate = "crate::in_use")]
 impl Tracker {
-    /// A tracker with the options of `thetahat track` for these channels, from nothing or from a fitted model.
+    /// A tracker with the options of a plan for these channels, from nothing or from a fitted model.
     #[new]
-    #[pyo3(signature = (options, inputs, outputs, report))]
+    #[pyo3(signature = (plan, sample_time, inputs, outputs, report))]
     fn new(
         py: Python<'_>,
-        options: Vec<OsString>,
+        plan: &str,
+        sample_time: Option<f64>,
         inputs: Vec<String>,
         outputs: Vec<String>,
         report: Option<&Bound<'_, Model>>,
     ) -> PyResult<Self> {
+        let asked: TrackOptions = options(py, plan)?;
         let report = report.map(|model| model.get().report(py)).transpose()?;
         let tracking = py
-            .detach(|| thetahat_cli::track(&options, inputs, outputs, report.as_deref()))
-            .map_err(|failure| error::program(py, &failure))?;
+            .detach(|| Tracking::new(&asked, sample_time, inputs, outputs, report.as_deref()))
+            .map_err(|error| match error {
+            thetahat::Error::Report { .. } => PyValueError::new_err(format!("warm: {error}")),
+            other => error::batch(py, other),
+        })?;
         Ok(Self { tracking })
     }
 

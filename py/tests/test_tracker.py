@@ -333,7 +333,7 @@ def test_bad_trackers() -> None:
     model = th.arx(th.dc_motor(), 2, 2)
     cases: list[tuple[dict[str, Any], type[Exception], str]] = [
         ({}, ValueError, "the orders are missing: give na and nb"),
-        ({"na": 2}, ValueError, "nb is missing"),
+        ({"na": 2}, ValueError, "nb: missing: give it"),
         ({"na": -1, "nb": 1}, ValueError, "na: -1 is below 0"),
         ({"na": 1.5, "nb": 1}, TypeError, "na: expected an int"),
         ({"na": 1, "nb": 1, "method": "rpem"}, ValueError, "^method: rpem is for models with C"),
@@ -454,7 +454,7 @@ def test_several_outputs_one_row_at_a_time() -> None:
     for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [1.0, np.inf]):
         with pytest.raises(ValueError, match=r"y: expected 2 numbers|infinite"):
             tracker.log_row(wrong, 0.0)
-    with pytest.raises(ValueError, match="couple is for several outputs"):
+    with pytest.raises(ValueError, match="couple: it is for several outputs"):
         th.Tracker(1, 1, couple="none")
     with pytest.raises(ValueError, match="several outputs are tracked as ARX"):
         th.Tracker(1, 1, 1, output=["a", "b"])

@@ -10,7 +10,7 @@ use super::channels::Channels;
 use super::pace::Pace;
 use crate::args::ResumeArgument;
 use crate::failure::Failure;
-use crate::job::{Clock, TrackJob};
+use crate::job::TrackJob;
 use crate::line_writer::{Format, Written};
 use crate::live::Live;
 use crate::replace::Held;
@@ -206,22 +206,32 @@ fn print(values: &[f64], time: Option<f64>) -> impl Iterator<Item = Option<f64>>
     [time].into_iter().chain(values.iter().map(|value| Some(*value).filter(|value| value.is_finite())))
 }
 
+/// What the lines of a run have in common.
+pub(super) struct Lines<'a> {
+    /// The column of times; empty without one.
+    pub(super) time: &'a str,
+    /// How many rows ahead a forecast is.
+    pub(super) horizon: Option<usize>,
+    /// A line for each row of which the number is a multiple of this.
+    pub(super) every: u64,
+    pub(super) format: Format,
+}
+
 /// What must be the same when a run goes on.
-pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker]) -> Vec<(String, String)> {
+pub(super) fn setting(lines: &Lines<'_>, channels: &Channels, trackers: &[Tracker]) -> Vec<(String, String)> {
     let mut setting = vec![
         ("--input".to_owned(), channels.inputs.join(",")),
         ("--output".to_owned(), channels.outputs.join(",")),
     ];
     let mut add = |option: &str, value: String| setting.push((option.to_owned(), value));
-    let clock = if let Clock::Column { name, .. } = &job.log.clock { name.as_str() } else { "" };
-    add("--time", clock.to_owned());
+    add("--time", lines.time.to_owned());
     if let Some(tracker) = trackers.first() {
         let plan = tracker.plan();
         add("the model", tracker.model());
         add("--constant", plan.constant.to_string());
         add("--method", plan.method.to_string());
         add("--start", plan.start.to_string());
-        add("--horizon", job.horizon.map_or_else(String::new, |rows| rows.to_string()));
+        add("--horizon", lines.horizon.map_or_else(String::new, |rows| rows.to_string()));
         add("--dead-zone", plan.dead_zone.to_string());
         add("--outliers", plan.outliers.to_string());
         let several = trackers.get(..channels.outputs.len()).unwrap_or_default();
@@ -234,8 +244,8 @@ pub(super) fn setting(job: &TrackJob, channels: &Channels, trackers: &[Tracker])
     let policies: Vec<String> =
         trackers.iter().map(|tracker| tracker.plan().forgetting.to_string()).collect();
     add("--forgetting", policies.join(","));
-    add("--every", job.lines.every.to_string());
-    let format = match job.lines.format {
+    add("--every", lines.every.to_string());
+    let format = match lines.format {
         Format::JsonLines => "jsonl",
         Format::Csv => "csv",
     };

@@ -1,15 +1,13 @@
 //! Tracking in memory: rows come from a caller, and nothing is read or written.
 
 use thetahat::report::Report;
-use thetahat::track::{TrackSummary, Tracked, Tracker, forecasts};
+use thetahat::track::{TrackOptions, TrackSummary, Tracked, Tracker, forecasts};
 
 use super::channels::Channels;
 use super::columns::Columns;
 use super::session::{Memory, Row, Session};
-use super::state::{self, State};
-use crate::args::TrackArguments;
+use super::state::{self, Lines, State};
 use crate::failure::Failure;
-use crate::job::{Clock, TrackJob};
 use crate::line_writer::{Format, LineWriter, Written};
 
 /// What `thetahat track` does with the rows of a log, fed row by row, with its state and its documents.
@@ -46,25 +44,28 @@ pub struct TrackedRow<'a> {
 }
 
 impl Tracking {
-    /// That of a log with these channels, with the options of `thetahat track`; with a report, `--warm` must be among
-    /// them.
-    pub(crate) fn new(
-        arguments: &TrackArguments,
+    /// That of a log with these channels; `sample_time` are the seconds between its rows, if they are known.
+    ///
+    /// # Errors
+    /// As for [`TrackOptions::check`] and [`TrackOptions::trackers`].
+    pub fn new(
+        options: &TrackOptions,
+        sample_time: Option<f64>,
         inputs: Vec<String>,
         outputs: Vec<String>,
         report: Option<&Report>,
-    ) -> Result<Self, Failure> {
-        let job = TrackJob::resolve(arguments)?;
-        let trackers = job.trackers(&inputs, &outputs, report)?;
+    ) -> Result<Self, thetahat::Error> {
+        options.check(report.is_some())?;
+        let trackers = options.trackers(&inputs, &outputs, report)?;
         let channels = Channels { inputs, outputs };
-        let setting = state::setting(&job, &channels, &trackers);
-        let sample_time = job.sample_time.or(report.map(|report| report.model.sample_time()));
+        let (horizon, every, format) = (options.horizon, 1, Format::JsonLines);
+        let setting = state::setting(&Lines { time: "", horizon, every, format }, &channels, &trackers);
+        let sample_time = sample_time.or(report.map(|report| report.model.sample_time()));
         let Channels { inputs, outputs } = channels;
         let state = State::new(setting, &outputs, trackers, None, sample_time);
-        let has_clock = matches!(job.log.clock, Clock::Column { .. });
-        let columns = Columns::new(has_clock, job.horizon, &state.outputs, &state.trackers);
-        let lines = LineWriter::counting(job.lines.format, columns.names(), None);
-        Ok(Self::of(inputs, outputs, job.lines.every, job.horizon, columns, state, lines))
+        let columns = Columns::new(false, horizon, &state.outputs, &state.trackers);
+        let lines = LineWriter::counting(format, columns.names(), None);
+        Ok(Self::of(inputs, outputs, every, horizon, columns, state, lines))
     }
 
     fn of(

@@ -1,5 +1,5 @@
-//! Writes the options of fits as Python has them, `py/python/thetahat/engine/fit_options.py`, from the one table of
-//! options; its test says whether it is up to date.
+//! Writes the options as Python has them, `py/python/thetahat/engine/option_types.py`, from the tables of options; its
+//! test says whether it is up to date.
 //!
 //! ```text
 //! cargo run -p thetahat --example python_options
@@ -9,9 +9,13 @@ use std::error::Error;
 use std::fmt::Write;
 use std::fs;
 
-use thetahat::plan::{FIT_OPTIONS, FitOption, Form, Kinds};
+use thetahat::design::DesignOptions;
+use thetahat::options::{Form, Kind, OptionRow, Options};
+use thetahat::plan::FitOptions;
+use thetahat::report::ValidationOptions;
+use thetahat::spectrum::SpectrumOptions;
 
-const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../py/python/thetahat/engine/fit_options.py");
+const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../py/python/thetahat/engine/option_types.py");
 
 /// The parameters that functions have before their options: what the model is about, its structure and its orders.
 const OWN_PARAMETERS: [&str; 23] = [
@@ -40,30 +44,37 @@ const OWN_PARAMETERS: [&str; 23] = [
     "term",
 ];
 
-/// A class, what it says, and the kind of model whose options it has.
-const CLASSES: [(&str, &str, Kinds); 6] = [
+/// A class of the options of a fit, what it says, and the kind of model whose options it has.
+const FITS: [(&str, &str, Kind); 6] = [
     (
         "FitOptions",
         "What every fit of a model of polynomials can be told, beside the orders.",
-        Kinds::POLYNOMIAL,
+        Kind::POLYNOMIAL,
     ),
-    ("ImpulseResponseOptions", "What a fit of an impulse response can be told.", Kinds::IMPULSE_RESPONSE),
-    ("StateSpaceOptions", "What a fit of a model in state space can be told.", Kinds::STATE_SPACE),
-    ("ProcessOptions", "What a fit of a process in continuous time can be told.", Kinds::PROCESS),
-    ("NarxOptions", "What a fit of a nonlinear ARX model can be told.", Kinds::NONLINEAR_ARX),
-    ("EquationsOptions", "What a fit of a model in equations can be told.", Kinds::EQUATIONS),
+    ("ImpulseResponseOptions", "What a fit of an impulse response can be told.", Kind::IMPULSE_RESPONSE),
+    ("StateSpaceOptions", "What a fit of a model in state space can be told.", Kind::STATE_SPACE),
+    ("ProcessOptions", "What a fit of a process in continuous time can be told.", Kind::PROCESS),
+    ("NarxOptions", "What a fit of a nonlinear ARX model can be told.", Kind::NONLINEAR_ARX),
+    ("EquationsOptions", "What a fit of a model in equations can be told.", Kind::EQUATIONS),
 ];
 
-const HEAD: &str = r#""""The options of fits, written from the one table of options: ``cargo run -p thetahat --example python_options``."""
+/// A class of the options of something else, what it says, and the table.
+const OTHERS: [(&str, &str, &[OptionRow]); 3] = [
+    ("ValidationOptions", "How to validate a model on a log.", ValidationOptions::TABLE),
+    ("SpectrumOptions", "How a frequency response is estimated from a log.", SpectrumOptions::TABLE),
+    ("DesignOptions", "What a test signal has to be.", DesignOptions::TABLE),
+];
+
+const HEAD: &str = r#""""The options of what takes many, written from their tables: ``cargo run -p thetahat --example python_options``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, Optional, TypedDict, Union
 
-from thetahat.engine.values import Band, Bound, Rows
+from thetahat.engine.values import Band, Bound, Duration, Frequencies, Rows
 "#;
 
 /// The name, type and documentation of an option in Python, where they are not those of the table.
-fn own(option: &FitOption) -> (String, String, String) {
+fn own(option: &OptionRow) -> (String, String, String) {
     let help = spelled(option.help.trim());
     let words = (option.words)();
     let kind = match option.python {
@@ -94,6 +105,7 @@ fn own(option: &FitOption) -> (String, String, String) {
             "bool".to_owned(),
             "Whether inputs act on the outputs in the same sample".to_owned(),
         ),
+        "sample_time" => ("sample_time".to_owned(), "Duration".to_owned(), help),
         field => (field.to_owned(), kind, help),
     }
 }
@@ -102,11 +114,14 @@ fn own(option: &FitOption) -> (String, String, String) {
 fn spelled(text: &str) -> String {
     text.split('`')
         .enumerate()
-        .map(
-            |(index, part)| {
-                if index % 2 == 1 { format!("``{}``", part.replace('-', "_")) } else { part.to_owned() }
-            },
-        )
+        .map(|(index, part)| {
+            match part {
+                // What is compared for a model has it as an argument.
+                "for" if index % 2 == 1 => "``model``".to_owned(),
+                name if index % 2 == 1 => format!("``{}``", name.replace('-', "_")),
+                text => text.to_owned(),
+            }
+        })
         .collect()
 }
 
@@ -125,40 +140,47 @@ fn wrapped(text: &str, indent: &str) -> String {
     lines + line.trim_end() + "\n"
 }
 
-/// The file that the table makes.
+/// The file that the tables make.
 fn file() -> Result<String, Box<dyn Error>> {
     let mut text = HEAD.to_owned();
-    for (name, says, kind) in CLASSES {
-        let takes = |option: &&FitOption| {
-            let chosen = kind == Kinds::POLYNOMIAL && option.field == "select";
-            option.kinds.contains(kind) && !OWN_PARAMETERS.contains(&option.field) && !chosen
+    for (name, says, kind) in FITS {
+        let takes = |option: &&OptionRow| {
+            let chosen = kind == Kind::POLYNOMIAL && option.field == "select";
+            option.is_for(kind) && !OWN_PARAMETERS.contains(&option.field) && !chosen
         };
-        let options: Vec<&FitOption> = FIT_OPTIONS.iter().filter(takes).collect();
-        write!(
-            text,
-            "\n\nclass {name}(TypedDict, total=False):\n    \"\"\"{says}\n\n    Attributes\n    ----------\n"
-        )?;
-        for option in &options {
-            let (field, _, help) = own(option);
-            let known = if field == "feedthrough" { Vec::new() } else { (option.words)() };
-            let words: String = known
-                .iter()
-                .map(|known| format!("; ``\"{}\"``: {}", known.word, spelled(known.help)))
-                .collect();
-            let default = match option.default {
-                "" => String::new(),
-                default => format!(" [default: {}]", spelled(default)),
-            };
-            writeln!(text, "    {field}")?;
-            text.push_str(&wrapped(&format!("{help}{words}{default}"), "        "));
-        }
-        text.push_str("    \"\"\"\n\n");
-        for option in options {
-            let (field, kind, _) = own(option);
-            writeln!(text, "    {field}: Optional[{kind}]")?;
-        }
+        class(&mut text, name, says, &FitOptions::TABLE.iter().filter(takes).collect::<Vec<_>>())?;
+    }
+    for (name, says, table) in OTHERS {
+        let takes = |option: &&OptionRow| !["input", "output", "signal", "want"].contains(&option.field);
+        class(&mut text, name, says, &table.iter().filter(takes).collect::<Vec<_>>())?;
     }
     Ok(text)
+}
+
+/// A class of some options.
+fn class(text: &mut String, name: &str, says: &str, options: &[&OptionRow]) -> Result<(), Box<dyn Error>> {
+    write!(
+        text,
+        "\n\nclass {name}(TypedDict, total=False):\n    \"\"\"{says}\n\n    Attributes\n    ----------\n"
+    )?;
+    for option in options {
+        let (field, _, help) = own(option);
+        let known = if field == "feedthrough" { Vec::new() } else { (option.words)() };
+        let words: String =
+            known.iter().map(|known| format!("; ``\"{}\"``: {}", known.word, spelled(known.help))).collect();
+        let default = match option.default {
+            "" => String::new(),
+            default => format!(" [default: {}]", spelled(default)),
+        };
+        writeln!(text, "    {field}")?;
+        text.push_str(&wrapped(&format!("{help}{words}{default}"), "        "));
+    }
+    text.push_str("    \"\"\"\n\n");
+    for option in options {
+        let (field, kind, _) = own(option);
+        writeln!(text, "    {field}: Optional[{kind}]")?;
+    }
+    Ok(())
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

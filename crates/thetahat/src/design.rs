@@ -19,6 +19,7 @@
 
 mod figures;
 mod multisine;
+mod options;
 mod planned;
 mod prbs;
 mod signal;
@@ -29,6 +30,7 @@ mod waveform;
 mod worth;
 
 pub use figures::SignalFigures;
+pub use options::DesignOptions;
 pub use planned::planned;
 pub use signal::{SignalPlan, TestSignal};
 pub use want::{Limit, Want};

@@ -18,7 +18,8 @@ use thetahat_numerics::optimize::Monitor;
 use crate::Error;
 use crate::data::{Detrend, Log, Rows, Source, Split};
 use crate::model::GreyBox;
-use crate::plan::{ColumnName, FitOptions, Fitted, Kinds};
+use crate::options::{ColumnName, Kind};
+use crate::plan::{FitOptions, Fitted};
 use crate::report::{
     EquationsPlan, NonlinearArxPlan, NormalEquations, PendingEvaluation, Plan, ProcessPlan, Report,
     StateSpacePlan, fit_equations, fit_nonlinear_arx_monitored, fit_process, fit_process_to_response,
@@ -89,15 +90,15 @@ impl FitDraft {
     pub fn new(options: &FitOptions, fitted: Fitted) -> Result<Self, Error> {
         let kind = options.kind(fitted)?.kind;
         let draft = match options.narx {
-            Some(map) if kind == Kinds::NONLINEAR_ARX => {
+            Some(map) if kind == Kind::NONLINEAR_ARX => {
                 Draft::NonlinearArx(Box::new(NonlinearArxDraft::new(options, map)?))
             }
-            _ if kind == Kinds::EQUATIONS => Draft::Equations(equations(options)?),
-            _ if kind == Kinds::PROCESS || kind == Kinds::RESPONSE => {
+            _ if kind == Kind::EQUATIONS => Draft::Equations(equations(options)?),
+            _ if kind == Kind::PROCESS || kind == Kind::RESPONSE => {
                 Draft::Process(Box::new(ProcessDraft::new(options, fitted)?))
             }
-            _ if kind == Kinds::STATE_SPACE || kind == Kinds::VECTOR_ARX => {
-                let is_arx = kind == Kinds::VECTOR_ARX;
+            _ if kind == Kind::STATE_SPACE || kind == Kind::VECTOR_ARX => {
+                let is_arx = kind == Kind::VECTOR_ARX;
                 Draft::StateSpace(Box::new(StateSpaceDraft::new(options, is_arx)?))
             }
             _ => Draft::Polynomial(Box::new(PolynomialDraft::new(options)?)),

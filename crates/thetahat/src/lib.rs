@@ -71,7 +71,8 @@
 //! | [`step_test`] | what a course reads off the response to a step |
 //! | [`tune`](mod@tune) | PI and PID settings for a process, and the loop that they give |
 //! | [`control`](mod@control) | controllers for a model, and the loops that they give |
-//! | [`plan`] | the options of a fit as data: one table, and plans in JSON |
+//! | [`options`] | options as data: tables of them, and those that were given in JSON |
+//! | [`plan`] | the options of a fit: a plan |
 //! | [`fit`] | from options to a model of any kind |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
@@ -99,6 +100,7 @@ pub mod fit;
 pub mod inspect;
 pub mod model;
 pub mod optimize;
+pub mod options;
 pub mod plan;
 #[cfg(feature = "present")]
 pub mod present;

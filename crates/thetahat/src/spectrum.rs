@@ -27,6 +27,7 @@ mod estimate;
 mod etfe;
 mod honesty;
 mod lpm;
+mod options;
 mod periods;
 mod plan;
 mod response;
@@ -39,6 +40,7 @@ mod tests;
 mod welch;
 
 pub use agreement::Agreement;
+pub use options::{FrequencyRange, SpectrumMethod, SpectrumOptions};
 pub use plan::{Estimator, Frequencies, Method, SpectrumPlan};
 pub use response::{BandQuality, MeasuredResponse, NoisePoint};
 pub use run::spectrum;

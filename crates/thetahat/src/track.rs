@@ -33,6 +33,7 @@ mod equation;
 mod estimator;
 mod forecasts;
 mod missing;
+mod options;
 mod plan;
 mod run_length;
 mod score;
@@ -44,6 +45,7 @@ mod warm;
 mod words;
 
 pub use forecasts::forecasts;
+pub use options::{TrackMap, TrackModel, TrackOptions};
 pub use plan::{PerChannel, Policy, TrackMethod, TrackOutliers, TrackPlan, TrackStart};
 pub use run_length::change_detector;
 pub use score::TrackScore;

@@ -56,15 +56,18 @@ from thetahat._thetahat import (
 from thetahat.base.said import EstimationWarning
 from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat.controllers.tune import Tuning, tune
-from thetahat.engine.fit_options import (
+from thetahat.engine.option_types import (
+    DesignOptions,
     EquationsOptions,
     FitOptions,
     ImpulseResponseOptions,
     NarxOptions,
     ProcessOptions,
+    SpectrumOptions,
     StateSpaceOptions,
+    ValidationOptions,
 )
-from thetahat.engine.options import DesignOptions, ReadOptions, SpectrumOptions, StepTestOptions, ValidationOptions
+from thetahat.engine.options import ReadOptions
 from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
@@ -152,7 +155,6 @@ __all__ = [
     "StateTrajectory",
     "SteadyState",
     "StepTest",
-    "StepTestOptions",
     "TestSignal",
     "Topic",
     "TrackTrajectory",

@@ -37,7 +37,7 @@ from dask.delayed import Delayed
 from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import EquationsOptions
+from thetahat.engine.option_types import EquationsOptions
 from thetahat.fits import many as _many
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, general, oe, search, told
 from thetahat.fits.grey_box import GreyBox, grey

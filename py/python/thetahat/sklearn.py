@@ -26,7 +26,7 @@ except ImportError as error:
     raise ImportError(message) from error
 
 from thetahat.base import clock as _clock, numbers as _numbers
-from thetahat.engine.fit_options import NarxOptions
+from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import arx
 from thetahat.fits.narx import narx
 from thetahat.fits.state_space import ss

@@ -394,6 +394,18 @@ impl Model {
         }
     }
 
+    /// The process.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if it is none; `what` is of one.
+    pub fn process(&self, what: &str) -> Result<&ProcessModel, Error> {
+        self.as_process().ok_or_else(|| {
+            let message =
+                format!("it is {}, and {what} of a process: fit one (`structure` p1d)", self.name());
+            Error::argument("model", message)
+        })
+    }
+
     /// The polynomials.
     ///
     /// # Errors

@@ -1,9 +1,9 @@
 //! Which kind of model some options ask for, and whether it takes them all.
 
-use super::kind::Kinds;
-use super::options::FitOptions;
+use super::fit::FitOptions;
 use super::words::{MapWord, ModelWord};
 use crate::Error;
+use crate::options::{Kind, Options};
 
 /// What is fitted beside options: they say the rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub enum Fitted {
 
 /// The kind of model that is asked for, and the option that says so; none where nothing says it.
 pub(crate) struct Asked {
-    pub(crate) kind: Kinds,
+    pub(crate) kind: Kind,
     because: Option<String>,
 }
 
@@ -37,38 +37,29 @@ impl FitOptions {
     /// [`Error::Argument`] for an option that this kind of model does not take.
     pub(crate) fn kind(&self, fitted: Fitted) -> Result<Asked, Error> {
         let asked = self.asked(fitted);
-        for (option, _) in self.given() {
-            if option.kinds.contains(asked.kind) {
-                continue;
-            }
-            let message = match &asked.because {
-                Some(because) => format!("does not work with {because}; leave one of the two out"),
-                None => format!("it is for {}; leave it out, or give that", option.kinds.named()),
-            };
-            return Err(Error::argument(&option.name(), message));
-        }
+        self.check_kind(asked.kind, asked.because.as_deref())?;
         Ok(asked)
     }
 
     fn asked(&self, fitted: Fitted) -> Asked {
         let because = |option: &str| Some(option.to_owned());
         let several_outputs = match fitted {
-            Fitted::Equations => return Asked { kind: Kinds::EQUATIONS, because: because("`grey`") },
-            Fitted::Response => return Asked { kind: Kinds::RESPONSE, because: because("`from`") },
+            Fitted::Equations => return Asked { kind: Kind::EQUATIONS, because: because("`grey`") },
+            Fitted::Response => return Asked { kind: Kind::RESPONSE, because: because("`from`") },
             Fitted::Log { several_outputs } => several_outputs || self.output.len() > 1,
         };
         if self.narx.is_some_and(|map| map != MapWord::None) {
-            return Asked { kind: Kinds::NONLINEAR_ARX, because: because("`narx`") };
+            return Asked { kind: Kind::NONLINEAR_ARX, because: because("`narx`") };
         }
         let own = self.model.map(|model| format!("`model` {}", model.word()));
         match self.model {
-            Some(ModelWord::Process | ModelWord::Tf) => return Asked { kind: Kinds::PROCESS, because: own },
-            Some(ModelWord::Ss) => return Asked { kind: Kinds::STATE_SPACE, because: own },
-            Some(ModelWord::Fir) => return Asked { kind: Kinds::IMPULSE_RESPONSE, because: own },
+            Some(ModelWord::Process | ModelWord::Tf) => return Asked { kind: Kind::PROCESS, because: own },
+            Some(ModelWord::Ss) => return Asked { kind: Kind::STATE_SPACE, because: own },
+            Some(ModelWord::Fir) => return Asked { kind: Kind::IMPULSE_RESPONSE, because: own },
             None if !self.structure.is_empty() => {
-                return Asked { kind: Kinds::PROCESS, because: because("`structure`") };
+                return Asked { kind: Kind::PROCESS, because: because("`structure`") };
             }
-            None if !self.np.is_empty() => return Asked { kind: Kinds::PROCESS, because: because("`np`") },
+            None if !self.np.is_empty() => return Asked { kind: Kind::PROCESS, because: because("`np`") },
             _ => {}
         }
         // A model without inputs is asked for as of all structures.
@@ -76,12 +67,12 @@ impl FitOptions {
         let orders = noise || self.na.is_some() || (!self.nb.is_empty() && !self.is_without_inputs());
         let several = || because("several outputs");
         match self.model {
-            Some(ModelWord::Arx) if several_outputs => Asked { kind: Kinds::VECTOR_ARX, because: several() },
+            Some(ModelWord::Arx) if several_outputs => Asked { kind: Kind::VECTOR_ARX, because: several() },
             None if several_outputs && orders && !noise => {
-                Asked { kind: Kinds::VECTOR_ARX, because: several() }
+                Asked { kind: Kind::VECTOR_ARX, because: several() }
             }
-            None if several_outputs && !orders => Asked { kind: Kinds::STATE_SPACE, because: several() },
-            _ => Asked { kind: Kinds::POLYNOMIAL, because: own },
+            None if several_outputs && !orders => Asked { kind: Kind::STATE_SPACE, because: several() },
+            _ => Asked { kind: Kind::POLYNOMIAL, because: own },
         }
     }
 }

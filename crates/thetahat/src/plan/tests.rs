@@ -2,6 +2,7 @@ use serde_json::{Map, Value, json};
 
 use super::*;
 use crate::Error;
+use crate::options::{Kind, OptionRow, Options};
 
 /// Options as text, read.
 fn read(text: &str) -> Result<FitOptions, Error> {
@@ -10,9 +11,9 @@ fn read(text: &str) -> Result<FitOptions, Error> {
 
 #[test]
 fn the_table_names_options_that_there_are() {
-    let names: Vec<String> = FIT_OPTIONS.iter().map(FitOption::name).collect();
+    let names: Vec<String> = FitOptions::TABLE.iter().map(OptionRow::name).collect();
     let beside = ["grey", "from"];
-    for (index, option) in FIT_OPTIONS.iter().enumerate() {
+    for (index, option) in FitOptions::TABLE.iter().enumerate() {
         assert!(!names[..index].contains(&option.name()), "{} stands twice", option.field);
         assert!(!option.help.trim().ends_with('.'), "{}: {}", option.field, option.help);
         let texts = [option.help, option.default].into_iter().map(str::to_owned);
@@ -99,17 +100,17 @@ fn what_cannot_be_is_refused_with_its_name() {
 fn a_kind_of_model_takes_its_own_options() -> Result<(), Error> {
     let log = Fitted::Log { several_outputs: false };
     for (text, fitted, kind) in [
-        ("{}", log, Kinds::POLYNOMIAL),
-        (r#"{"narx": "none"}"#, log, Kinds::POLYNOMIAL),
-        (r#"{"model": "fir"}"#, log, Kinds::IMPULSE_RESPONSE),
-        (r#"{"np": 2}"#, log, Kinds::PROCESS),
-        (r#"{"structure": "p1"}"#, Fitted::Response, Kinds::RESPONSE),
-        (r#"{"narx": "auto"}"#, log, Kinds::NONLINEAR_ARX),
-        ("{}", Fitted::Equations, Kinds::EQUATIONS),
-        ("{}", Fitted::Log { several_outputs: true }, Kinds::STATE_SPACE),
-        (r#"{"output": ["a", "b"], "nb": 0}"#, log, Kinds::STATE_SPACE),
-        (r#"{"output": ["a", "b"], "na": 1}"#, log, Kinds::VECTOR_ARX),
-        (r#"{"output": ["a", "b"], "nf": 1}"#, log, Kinds::POLYNOMIAL),
+        ("{}", log, Kind::POLYNOMIAL),
+        (r#"{"narx": "none"}"#, log, Kind::POLYNOMIAL),
+        (r#"{"model": "fir"}"#, log, Kind::IMPULSE_RESPONSE),
+        (r#"{"np": 2}"#, log, Kind::PROCESS),
+        (r#"{"structure": "p1"}"#, Fitted::Response, Kind::RESPONSE),
+        (r#"{"narx": "auto"}"#, log, Kind::NONLINEAR_ARX),
+        ("{}", Fitted::Equations, Kind::EQUATIONS),
+        ("{}", Fitted::Log { several_outputs: true }, Kind::STATE_SPACE),
+        (r#"{"output": ["a", "b"], "nb": 0}"#, log, Kind::STATE_SPACE),
+        (r#"{"output": ["a", "b"], "na": 1}"#, log, Kind::VECTOR_ARX),
+        (r#"{"output": ["a", "b"], "nf": 1}"#, log, Kind::POLYNOMIAL),
     ] {
         assert_eq!(read(text)?.kind(fitted)?.kind, kind, "{text}");
     }

@@ -1,46 +1,12 @@
-//! Options whose values are words, each with what it means.
+//! The values of the options of a fit: words, each with what it means, and what has a notation of its own.
 
 use thetahat_numerics::optimize::Algorithm;
 
-use super::value::{OptionText, Word, none_of};
-use crate::estimate::{Constant, Initial, Loss};
-use crate::model::Membership;
-use crate::select::Path;
-
-/// The words of a type, one for each of its variants.
-macro_rules! words {
-    ($own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
-        impl $own {
-            /// As it is written.
-            pub(crate) fn word(self) -> &'static str {
-                match self { $(Self::$variant => $word,)* }
-            }
-        }
-        words!(of $own { $($variant $word $(| $alias)? $help,)* });
-    };
-    (alias) => { None };
-    (alias $alias:literal) => { Some($alias) };
-    (of $own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
-        impl OptionText for $own {
-            const PYTHON: &'static str = "";
-
-            fn words() -> Vec<Word> {
-                vec![$(Word { word: $word, alias: words!(alias $($alias)?), help: $help },)*]
-            }
-
-            fn of(text: &str) -> Result<Self, String> {
-                match text {
-                    $($word $(| $alias)? => Ok(Self::$variant),)*
-                    other => Err(none_of(other, &Self::words())),
-                }
-            }
-
-            fn text(&self) -> String {
-                match self { $(Self::$variant => $word,)* }.to_owned()
-            }
-        }
-    };
-}
+use crate::data::{Prefilter, Split};
+use crate::estimate::{Bound, Constant, GainBound, Initial, Loss, Refine, Weighting};
+use crate::model::{Membership, ProcessStructure};
+use crate::options::{Form, OptionText, Word, none_of, texts, words};
+use crate::select::{Focus, OrderRange, Path, Select};
 
 /// The structure of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -311,5 +277,57 @@ impl OptionText for StepOption {
 
     fn text(&self) -> String {
         self.c2.map_or_else(|| self.c1.to_string(), |c2| format!("{},{c2}", self.c1))
+    }
+}
+
+/// The samples that an input waits, or a range of them: they are no coefficients, of which there are so many at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DelayRange(pub OrderRange);
+
+impl OptionText for DelayRange {
+    const LIST: Form = Form::List;
+    const PYTHON: &'static str = "Order";
+    const PYTHON_LIST: &'static str = "Orders";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<usize>().ok();
+        let ends = match text.split_once("..") {
+            Some((first, last)) => number(first).zip(number(last)),
+            None => number(text).map(|delay| (delay, delay)),
+        };
+        let range = ends.and_then(|(first, last)| OrderRange::new(first, last).ok());
+        range.map(Self).ok_or_else(|| format!("'{text}' is no delay; write 2, or a range as 0..10"))
+    }
+
+    fn text(&self) -> String {
+        self.0.to_string()
+    }
+}
+
+texts! {
+    Bound, Repeated, "str", "Mapping[str, Bound]";
+    Focus, Repeated, "Union[int, Literal[\"auto\", \"prediction\", \"simulation\"]]", "Sequence[str]";
+    GainBound, Repeated, "str", "Union[Bound, Mapping[str, Bound]]";
+    OrderRange, List, "Order", "Orders";
+    Prefilter, Repeated, "Band", "Sequence[str]";
+    ProcessStructure, List, "str", "Union[str, Sequence[str]]";
+    Refine, Repeated, "Literal[\"prediction\", \"simulation\"]", "Sequence[str]";
+    Split, Repeated, "Union[str, tuple[float, float, float]]", "Sequence[str]";
+    Weighting, Repeated, "Literal[\"ssarx\", \"moesp\", \"n4sid\", \"cva\"]", "Sequence[str]";
+}
+
+impl OptionText for Select {
+    const PYTHON: &'static str = "";
+
+    fn words() -> Vec<Word> {
+        Self::all().map(|select| Word { word: select.word(), alias: None, help: select.says() }).collect()
+    }
+
+    fn of(text: &str) -> Result<Self, String> {
+        Self::all().find(|select| select.word() == text).ok_or_else(|| none_of(text, &Self::words()))
+    }
+
+    fn text(&self) -> String {
+        self.word().to_owned()
     }
 }

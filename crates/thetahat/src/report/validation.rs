@@ -1,4 +1,5 @@
 mod document;
+mod options;
 #[cfg(test)]
 mod tests;
 
@@ -7,6 +8,7 @@ use std::collections::BTreeMap;
 use thetahat_numerics::regression::sum;
 
 pub use document::{Comparison, Coverage, InSample, NoiseLevel, Validation};
+pub use options::{Offsets, ValidationOptions};
 
 use super::Report;
 use super::evaluate::of_output;

@@ -94,6 +94,8 @@ pub struct SpectrumPlan {
 
 /// Frequencies where none are asked for.
 const POINTS: usize = 200;
+/// No more of them.
+const MOST_POINTS: usize = 1_000_000;
 
 impl Default for Method {
     fn default() -> Self {
@@ -227,7 +229,9 @@ impl SpectrumPlan {
                     return Err(Error::argument("points", message));
                 }
                 match points {
-                    Some(0 | 1) => Err(Error::argument("points", "give at least 2")),
+                    Some(points) if !(2..=MOST_POINTS).contains(points) => {
+                        Err(Error::argument("points", format!("{points} is outside 2..{MOST_POINTS}")))
+                    }
                     _ => Ok(()),
                 }
             }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, Union
@@ -106,38 +107,46 @@ class Control(Document):
         return f"Control({self.document['design']})"
 
 
-def _poles(name: str, given: complex | Sequence[complex]) -> str:
-    """A pole, or several, as the command line writes them."""
+def _poles(name: str, given: complex | Sequence[complex]) -> list[tuple[float, float]]:
+    """A pole, or several, each as its real and its imaginary part."""
     try:
         each = np.atleast_1d(np.asarray(given, dtype=np.complex128))
     except (TypeError, ValueError) as error:
         raise TypeError(f"{name}: expected numbers, found {given!r}") from error
     if each.ndim != 1 or each.size == 0:
         raise ValueError(f"{name}: expected one or more poles")
-    words = (repr(pole.real) if pole.imag == 0 else f"{pole.real!r}{pole.imag:+}i" for pole in map(complex, each))
-    return ",".join(words)
+    if not np.isfinite(each).all():
+        raise ValueError(f"{name}: expected finite numbers, found {given!r}")
+    return [(float(pole.real), float(pole.imag)) for pole in each]
 
 
 def _designed(
     model: Model,
-    words: list[str],
+    design: str,
+    aim: list[tuple[float, float]] | float,
     input: str | None,
     output: str | None,
     integrator: bool,
     limits: tuple[float | None, float | None] | None,
     draws: int,
+    observer: complex | Sequence[complex] | None = None,
+    cancel_zeros: bool = False,
 ) -> Control:
     if not isinstance(model, Model):
         raise TypeError(f"model: expected a Model, found {type(model).__name__}")
-    words += [] if input is None else [f"--input={_options.text('input', input)}"]
-    words += [] if output is None else [f"--output={_options.text('output', output)}"]
-    words.append(f"--integrator={'yes' if integrator else 'no'}")
-    if limits is not None:
-        low, high = limits
-        ends = ("-inf" if low is None else repr(float(low)), "inf" if high is None else repr(float(high)))
-        words.append(f"--limits={ends[0]}..{ends[1]}")
-    words.append(f"--draws={_options.count('draws', draws, 100_000)}")
-    return Control(*_thetahat.control(model._model, words))
+    low, high = (None, None) if limits is None else limits
+    return Control(
+        *_thetahat.control(
+            model._model,
+            design,
+            aim if isinstance(aim, list) else [(aim, 0.0)],
+            None if observer is None else _poles("observer", observer),
+            (None if input is None else _options.text("input", input), None if output is None else _options.text("output", output)),
+            (bool(integrator), bool(cancel_zeros)),
+            (-math.inf if low is None else float(low), math.inf if high is None else float(high)),
+            _options.count("draws", draws, 100_000),
+        )
+    )
 
 
 def pole_placement(
@@ -186,12 +195,7 @@ def pole_placement(
     -----
     Åström and Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, chapter 5.
     """
-    words = [f"--poles={_poles('poles', poles)}"]
-    if observer is not None:
-        words.append(f"--observer={_poles('observer', observer)}")
-    if cancel_zeros:
-        words.append("--cancel-zeros")
-    return _designed(model, words, input, output, integrator, limits, draws)
+    return _designed(model, "poles", _poles("poles", poles), input, output, integrator, limits, draws, observer, cancel_zeros)
 
 
 def lqr(
@@ -230,10 +234,8 @@ def lqr(
     -----
     Åström and Wittenmark, Computer-Controlled Systems, 3rd ed., 1997, chapters 11 and 12.
     """
-    words = [f"--lqr={_options.number('weight', weight)}"]
-    if observer is not None:
-        words.append(f"--observer={_poles('observer', observer)}")
-    return _designed(model, words, input, output, integrator, limits, draws)
+    weight = float(_options.number("weight", weight))
+    return _designed(model, "lqr", weight, input, output, integrator, limits, draws, observer)
 
 
 def minimum_variance(
@@ -270,8 +272,8 @@ def minimum_variance(
     -----
     Åström, Introduction to Stochastic Control Theory, 1970, chapter 6; Clarke and Gawthrop, Proc. IEE 122, 1975.
     """
-    words = [f"--minimum-variance={_options.number('weight', weight)}"]
-    return _designed(model, words, input, output, integrator, limits, draws)
+    weight = float(_options.number("weight", weight))
+    return _designed(model, "minimum-variance", weight, input, output, integrator, limits, draws)
 
 
 class Controller(Protocol):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
+from thetahat.engine.values import Duration
 from thetahat.models.model import Model
 
 Array = npt.NDArray[np.float64]
@@ -64,8 +65,8 @@ def tune(
     model: Model,
     *,
     input: str | None = None,
-    closed_loop_time: float | None = None,
-    controller: str | None = None,
+    closed_loop_time: Duration | None = None,
+    controller: Literal["pi", "pid"] | None = None,
 ) -> Tuning:
     """PI and PID settings for a process by SIMC and lambda tuning, and the closed loop that they give.
 
@@ -75,7 +76,7 @@ def tune(
         A process, as `process` fits it.
     input : str, optional
         The input that the controller moves, if there are several.
-    closed_loop_time : float, optional
+    closed_loop_time : float or timedelta, optional
         The time constant that the loop shall have, in seconds: tau_c or lambda. Unless said otherwise the dead time by SIMC, and the
         longer of lag and dead time by lambda tuning.
     controller : {"pi", "pid"}, optional
@@ -96,9 +97,7 @@ def tune(
     """
     if not isinstance(model, Model):
         raise TypeError(f"model: expected a Model, found {type(model).__name__}")
-    words = [] if input is None else [f"--input={_options.text('input', input)}"]
-    if closed_loop_time is not None:
-        words.append(f"--lambda={_options.number('closed_loop_time', closed_loop_time)}")
-    if controller is not None:
-        words.append(f"--controller={_options.text('controller', controller)}")
-    return Tuning(*_thetahat.tune(model._model, words))
+    named = None if input is None else _options.text("input", input)
+    lasts = None if closed_loop_time is None else _options.seconds("closed_loop_time", closed_loop_time)
+    which = None if controller is None else _options.text("controller", controller)
+    return Tuning(*_thetahat.tune(model._model, named, lasts, which))

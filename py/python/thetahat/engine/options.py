@@ -1,4 +1,4 @@
-"""Keyword arguments as options: of a fit as a plan, of other verbs in the words of the command line."""
+"""Keyword arguments as options: as a plan, and how a file is read in the words of the command line."""
 
 from __future__ import annotations
 
@@ -18,126 +18,7 @@ from typing import Any, Callable, Literal, Optional, TypedDict, TypeVar, Union, 
 import numpy as np
 
 from thetahat.engine import files as _files
-from thetahat.engine.values import Duration, Frequencies, Orders, Resample, Rows
-
-
-class ValidationOptions(TypedDict, total=False):
-    """How to validate a model on a log.
-
-    Attributes
-    ----------
-    rows : rows
-        The rows to validate on; all, unless said otherwise.
-    detrend : {"model", "none", "mean", "linear", "start:K"}
-        The offsets: the model's own, or those of the rows evaluated.
-    horizon : int or list of int
-        Prediction horizons besides 1, in steps.
-    lags : int
-        Lags of the tests of residuals.
-    alpha : float
-        Reject where less than this chance is left.
-    alphas : list of float
-        The levels of Anderson's test.
-    """
-
-    rows: Optional[Rows]
-    detrend: Optional[Union[Literal["model", "none", "mean", "linear"], str]]
-    horizon: Optional[Union[int, Sequence[int]]]
-    lags: Optional[int]
-    alpha: Optional[float]
-    alphas: Optional[Sequence[float]]
-
-
-class SpectrumOptions(TypedDict, total=False):
-    """How a frequency response is estimated from a log.
-
-    Attributes
-    ----------
-    rows : rows
-        The rows to use; all, unless said otherwise. Each range is a segment of its own.
-    detrend : {"mean", "none", "linear", "start:K"}
-        What is taken from each channel first.
-    method : {"lpm", "spa", "welch", "etfe", "sines"}
-        Local polynomials; Blackman and Tukey's windowed covariances; Welch's averages over windows; the plain ratio of the
-        transforms; correlation over whole periods of a stepped or a multi-sine input.
-    frequencies : (float, float) or list of float
-        Frequencies in radians per second: a band as a tuple of two, or for "lpm" and "spa" a list of them.
-    points : int
-        For "lpm" and "spa": how many frequencies of the band.
-    half_width : int
-        For "lpm": lines of the transform on either side of a frequency.
-    lags : int
-        For "spa": lags of the Hann window.
-    window : int
-        For "welch": rows of a window.
-    estimator : {"h1", "h2"}
-        For "welch": where the noise is, in the output or in the input.
-    period, discard : int
-        For "sines": rows of a period, and how many periods to leave out at the beginning.
-    """
-
-    rows: Optional[Rows]
-    detrend: Optional[Union[Literal["mean", "none", "linear"], str]]
-    method: Optional[Literal["lpm", "spa", "welch", "etfe", "sines"]]
-    frequencies: Optional[Frequencies]
-    points: Optional[int]
-    half_width: Optional[int]
-    lags: Optional[int]
-    window: Optional[int]
-    estimator: Optional[Literal["h1", "h2"]]
-    period: Optional[int]
-    discard: Optional[int]
-
-
-class StepTestOptions(TypedDict, total=False):
-    """What of a log is a step test.
-
-    Attributes
-    ----------
-    rows : rows
-        The rows to use; all, unless said otherwise. Each range is for itself.
-    """
-
-    rows: Optional[Rows]
-
-
-class DesignOptions(TypedDict, total=False):
-    """What a test signal has to be.
-
-    Attributes
-    ----------
-    length : int
-        How many samples; 1023, a period of a PRBS, unless said otherwise.
-    range : (float, float)
-        The lowest and the highest value, in units of the input; (-1, 1) unless said otherwise.
-    rms : float
-        A power budget: the root mean square of the deviations from the middle of ``range``, instead of its width.
-    band : (float, float)
-        The lowest and the highest frequency of a multisine, a chirp or stepped sines, in radians per second; all of them unless said
-        otherwise.
-    points : int
-        How many frequencies, each the same factor above the one before: of a multisine, which has every line of its period otherwise,
-        and of stepped sines, which have 10.
-    period : int
-        After how many samples the signal repeats itself: of a PRBS the longest that fits, of a multisine 4096 at most, else the
-        length.
-    channels : int
-        How many signals without correlation: 1, or with a model one for each of its inputs.
-    sample_time : float or timedelta
-        Time from one sample to the next: 1 s, or that of the model.
-    seed : int
-        Which random signal, or where a PRBS begins.
-    """
-
-    length: Optional[int]
-    range: Optional[tuple[float, float]]
-    rms: Optional[float]
-    band: Optional[tuple[float, float]]
-    points: Optional[int]
-    period: Optional[int]
-    channels: Optional[int]
-    sample_time: Optional[Duration]
-    seed: Optional[int]
+from thetahat.engine.values import Duration, Resample
 
 
 class ReadOptions(TypedDict, total=False):
@@ -194,9 +75,8 @@ class ReadOptions(TypedDict, total=False):
     values: Optional[Mapping[str, float]]
 
 
-def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) -> list[str]:
-    """Those of a function's arguments that are options, in the words of the command line; ``rows`` is where an open slice
-    ends.
+def words(arguments: Mapping[str, Any]) -> list[str]:
+    """Those of a function's arguments that say how a file is read, in the words of the command line.
 
     Raises
     ------
@@ -206,7 +86,7 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
         For a value that cannot be.
     """
     found: list[str] = []
-    for name in allowed.__annotations__:
+    for name in ReadOptions.__annotations__:
         value = arguments.get(name)
         if value is None:
             continue
@@ -219,14 +99,14 @@ def words(allowed: type, arguments: Mapping[str, Any], rows: int | None = None) 
         elif name == "decimal_comma":
             found.append(f"--decimal-comma={'yes' if flag(name, value) else 'no'}")
         elif name == "values":
-            found += [f"--value={one}" for one in _texts(name, value, rows)]
+            found += [f"--value={one}" for one in _texts(name, value, None)]
         else:
-            found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, rows)]
+            found += [f"--{name.replace('_', '-')}={text}" for text in _texts(name, value, None)]
     return found
 
 
 def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
-    """Options of a fit as a plan, in JSON; those that are None were not given. ``rows`` is where an open slice ends.
+    """Options as a plan, in JSON; those that are None were not given. ``rows`` is where an open slice ends.
 
     Raises
     ------
@@ -250,7 +130,7 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
             found["regressor"] = [text(name, one) for one in value] or None
         elif name == "feedthrough":
             found[name] = "yes" if flag(name, value) else "no"
-        elif name in ("trend", "raw_terms", "drawn", "delay"):
+        elif name in ("trend", "raw_terms", "drawn", "delay") or (name == "constant" and isinstance(value, bool)):
             found[name] = flag(name, value)
         elif name in ("past", "future"):
             found[name] = count(name, value)
@@ -275,11 +155,6 @@ def _orders(name: str, value: Any) -> list[str]:
     if not texts:
         raise ValueError(f"{name}: there is none; give one for each channel")
     return [",".join(texts)]
-
-
-def order_words(**orders: Orders | None) -> list[str]:
-    """Orders in the words of the command line."""
-    return [f"--{name}={','.join(_orders(name, value))}" for name, value in orders.items() if value is not None]
 
 
 _F = TypeVar("_F", bound=Callable[..., Any])
@@ -429,7 +304,8 @@ def _span(name: str, value: Any, first: int) -> str:
     return f"{start + first}..{stop - 1 + first}"
 
 
-def _rows(name: str, value: Any, rows: int | None) -> list[str]:
+def rows_of(name: str, value: Any, rows: int | None) -> list[str]:
+    """Ranges of rows, counted from 1; ``rows`` is where an open slice ends."""
     if isinstance(value, str):
         return [value]
     if isinstance(value, slice) and value.stop is None:
@@ -437,7 +313,7 @@ def _rows(name: str, value: Any, rows: int | None) -> list[str]:
     if isinstance(value, (slice, range)):
         return [_span(name, value, 1)]
     if isinstance(value, (list, tuple)):
-        return [one for part in value for one in _rows(name, part, rows)]
+        return [one for part in value for one in rows_of(name, part, rows)]
     raise TypeError(f"{name}: expected a slice, a range or a text such as '1..500', found {value!r}")
 
 
@@ -463,15 +339,15 @@ _WHOLE = frozenset(
 
 def _texts(name: str, value: Any, rows: int | None) -> list[str]:
     if name in ("estimate", "validate", "rows"):
-        return [",".join(_rows(name, value, rows))]
+        return [",".join(rows_of(name, value, rows))]
     if name == "values":
         if not isinstance(value, Mapping):
             raise TypeError(f"{name}: expected a dict, found {value!r}")
         return [f"{text(name, word)}={number(name, of)}" for word, of in value.items()]
-    if name in ("offset", "bound"):
+    if name in ("offset", "scale", "bound"):
         if not isinstance(value, Mapping):
             raise TypeError(f"{name}: expected a dict, found {value!r}")
-        return [f"{key}={number(name, of) if name == 'offset' else _bound(name, of)}" for key, of in value.items()]
+        return [f"{text(name, key)}={_bound(name, of) if name == 'bound' else number(name, of)}" for key, of in value.items()]
     if name == "dc_gain":
         if isinstance(value, Mapping):
             return [f"{key}={_bound(name, of)}" for key, of in value.items()]
@@ -515,7 +391,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [",".join(number(name, one) for one in every)]
     if name == "sample_time":
         return [number(name, seconds(name, value))]
-    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "width", "rms"):
+    if name in ("tolerance", "time_limit", "ridge", "noise_bound", "alpha", "width", "rms", "dead_zone", "alarm"):
         return [number(name, value)]
     return [text(name, value)]
 

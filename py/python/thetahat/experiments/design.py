@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Union, overload
+from typing import TYPE_CHECKING, Union, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +12,11 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import DesignOptions
-from thetahat.engine.values import Duration
+from thetahat.engine.option_types import DesignOptions
 from thetahat.models.model import Model
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Array = npt.NDArray[np.float64]
 
@@ -48,8 +50,8 @@ class TestSignal:
     # Its name does not make it a class of tests.
     __test__ = False
 
-    def __init__(self, name: str, words: Sequence[str]) -> None:
-        channels, figures, period, frequencies, sample_time = _thetahat.design_signal(words)
+    def __init__(self, name: str, plan: str) -> None:
+        channels, figures, period, frequencies, sample_time = _thetahat.design_signal(plan)
         self._name = name
         self.inputs: Array = np.column_stack(channels)
         self.time: Array = np.arange(len(self.inputs), dtype=np.float64) * sample_time
@@ -98,50 +100,22 @@ class ExperimentDesign(Document):
 
 
 @overload
-def design(
-    signal: str = "prbs",
-    *,
-    length: int | None = None,
-    range: tuple[float, float] | None = None,
-    rms: float | None = None,
-    band: tuple[float, float] | None = None,
-    points: int | None = None,
-    period: int | None = None,
-    channels: int | None = None,
-    sample_time: Duration | None = None,
-    seed: int | None = None,
-) -> TestSignal: ...
+def design(signal: str = "prbs", **options: Unpack[DesignOptions]) -> TestSignal: ...
 @overload
 def design(
     signal: str | Sequence[str] | None = None,
     *,
     model: Model,
     want: Wanted | None = None,
-    length: int | None = None,
-    range: tuple[float, float] | None = None,
-    rms: float | None = None,
-    band: tuple[float, float] | None = None,
-    points: int | None = None,
-    period: int | None = None,
-    channels: int | None = None,
-    sample_time: Duration | None = None,
-    seed: int | None = None,
+    **options: Unpack[DesignOptions],
 ) -> ExperimentDesign: ...
-@_options.takes()
+@_options.takes(DesignOptions)
 def design(
     signal: str | Sequence[str] | None = None,
     *,
     model: Model | None = None,
     want: Wanted | None = None,
-    length: int | None = None,
-    range: tuple[float, float] | None = None,
-    rms: float | None = None,
-    band: tuple[float, float] | None = None,
-    points: int | None = None,
-    period: int | None = None,
-    channels: int | None = None,
-    sample_time: Duration | None = None,
-    seed: int | None = None,
+    **options: Unpack[DesignOptions],
 ) -> TestSignal | ExperimentDesign:
     """Make a test signal for an experiment, or say which one a model needs, and for how long.
 
@@ -180,20 +154,19 @@ def design(
     >>> min(found.needed, key=lambda signal: found.needed[signal] or 10**7) in ("prbs:4", "steps")
     True
     """
-    usual = "prbs" if model is None else None
-    names = [usual] if signal is None else [signal] if isinstance(signal, str) else list(signal)
-    words = [f"--signal={_options.text('signal', name)}" for name in names if name is not None]
-    words += _options.words(DesignOptions, locals())
+    usual = [] if model is not None else ["prbs"]
+    names = usual if signal is None else [signal] if isinstance(signal, str) else list(signal)
+    signals = ",".join(_options.text("signal", name) for name in names) or None
     if model is None:
         if want is not None:
             raise ValueError("want: it needs a model; give one, or leave it out")
-        return TestSignal(str(names[0]), words)
+        return TestSignal(str(names[0]), _options.plan({"signal": signals, **options}))
     if not isinstance(model, Model):
         raise TypeError(f"model: expected a Model, found {type(model).__name__}")
-    words += [f"--want={_want(figure, error)}" for figure, error in (want or {}).items()]
-    return ExperimentDesign(*_thetahat.compare_signals(model._model, words))
+    wanted = ",".join(_want(figure, error) for figure, error in (want or {}).items()) or None
+    return ExperimentDesign(*_thetahat.compare_signals(model._model, _options.plan({"signal": signals, "want": wanted, **options})))
 
 
 def _want(figure: str, error: float | str) -> str:
-    """A figure and its standard error, as the command line writes them."""
+    """A figure and its standard error, as a plan writes them."""
     return f"{_options.text('want', figure)}:{error if isinstance(error, str) else _options.number('want', error)}"

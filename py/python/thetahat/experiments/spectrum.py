@@ -12,7 +12,7 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import SpectrumOptions
+from thetahat.engine.option_types import SpectrumOptions
 from thetahat.logs.log import Log, handle
 from thetahat.models import convert as _convert
 from thetahat.models.responses import FrequencyResponse
@@ -203,5 +203,5 @@ def spectrum(
     >>> th.spectrum(log, frequencies=(1, 300), points=50)
     MeasuredResponse(lpm, 50 frequencies, u)
     """
-    words = _options.words(SpectrumOptions, options, len(log) if isinstance(log, Log) else None)
-    return MeasuredResponse(*_thetahat.spectrum(handle("log", log), words))
+    plan = _options.plan(options, len(log) if isinstance(log, Log) else None)
+    return MeasuredResponse(*_thetahat.spectrum(handle("log", log), plan))

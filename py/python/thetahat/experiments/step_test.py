@@ -8,7 +8,6 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import StepTestOptions
 from thetahat.engine.values import Rows
 from thetahat.experiments.spectrum import Array, MeasuredResponse
 from thetahat.logs.log import Log, handle
@@ -117,8 +116,8 @@ def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: s
     log : Log or MeasuredResponse
         The data, of one input and one output, on any clock (``uniform=False``); or the response that `spectrum` found from sines, of
         which the time constant is taken where the phase is -45 degrees.
-    rows
-        See `thetahat.StepTestOptions`.
+    rows : rows, optional
+        Of a log: the rows to use; all, unless said otherwise. Each range is for itself.
     input : str, optional
         Of a response from several inputs: which one.
 
@@ -153,5 +152,5 @@ def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: s
         return StepTest(*_thetahat.sine_test(log.to_json(), _options.text("input", input)))
     if input is not None:
         raise ValueError("input: it is for a response; take the input of a log with log.select(inputs=...)")
-    words = _options.words(StepTestOptions, {"rows": rows}, len(log) if isinstance(log, Log) else None)
-    return StepTest(*_thetahat.step_test(handle("log", log), words))
+    chosen = [] if rows is None else _options.rows_of("rows", rows, len(log) if isinstance(log, Log) else None)
+    return StepTest(*_thetahat.step_test(handle("log", log), chosen))

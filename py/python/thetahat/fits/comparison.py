@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from thetahat import _thetahat
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
-from thetahat.engine.options import ValidationOptions
+from thetahat.engine.option_types import ValidationOptions
 from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
@@ -63,7 +63,7 @@ def compare(
     >>> th.compare(models, log[700:])
     Comparison(arx, oe)
     """
-    words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
+    plan = _options.plan(options, len(log) if isinstance(log, Log) else None)
     named = dict(models) if isinstance(models, Mapping) else {f"model {k}": m for k, m in enumerate(models, 1)}
     if not named:
         raise ValueError("models: there is none; give at least one")
@@ -74,4 +74,4 @@ def compare(
     if over is not None and not isinstance(over, MeasuredResponse):
         raise TypeError(f"over: expected a MeasuredResponse, found {type(over).__name__}")
     response = None if over is None else over.to_json()
-    return Comparison(*_thetahat.compare(handles, handle("log", log), words, response))
+    return Comparison(*_thetahat.compare(handles, handle("log", log), plan, response))

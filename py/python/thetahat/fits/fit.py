@@ -10,7 +10,7 @@ from thetahat import _thetahat
 from thetahat.base import said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import FitOptions, ImpulseResponseOptions
+from thetahat.engine.option_types import FitOptions, ImpulseResponseOptions
 from thetahat.engine.values import Order, Orders
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model

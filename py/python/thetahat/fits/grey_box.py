@@ -14,7 +14,7 @@ import numpy as np
 
 from thetahat import _thetahat
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.fit_options import EquationsOptions
+from thetahat.engine.option_types import EquationsOptions
 from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model

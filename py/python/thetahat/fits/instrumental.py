@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import FitOptions
+from thetahat.engine.option_types import FitOptions
 from thetahat.engine.values import Orders
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log

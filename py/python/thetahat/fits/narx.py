@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, Union
 
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import NarxOptions
+from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log
 from thetahat.models.model import Model

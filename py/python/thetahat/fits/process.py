@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from thetahat import _thetahat
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import ProcessOptions
+from thetahat.engine.option_types import ProcessOptions
 from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from thetahat.engine import options as _options
-from thetahat.engine.fit_options import StateSpaceOptions
+from thetahat.engine.option_types import StateSpaceOptions
 from thetahat.engine.values import Orders
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log

@@ -162,7 +162,7 @@ def inspect(
     >>> th.inspect(th.dc_motor())
     Inspection(1000 rows, 0 warnings)
     """
-    words = _options.words(ReadOptions, locals())
+    words = _options.words(locals())
     if isinstance(log, Log):
         if words or inputs is not None or output is not None:
             raise TypeError("inputs, output and how to read are for files; a Log has its own")

@@ -179,7 +179,7 @@ def _read(
         words = [*_options.channels([*chosen, *outputs[:-1]], outputs[-1])]
     else:
         words = [*_options.channels(inputs, None if outputs is None else outputs[0])]
-    words += _options.words(ReadOptions, options)
+    words += _options.words(options)
     paths: list[Any] = list(path) if isinstance(path, (list, tuple)) else [path]
     if not paths:
         raise ValueError("path: there is none; give at least one")

@@ -15,7 +15,7 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers, picture as _picture, said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.options import ValidationOptions
+from thetahat.engine.option_types import ValidationOptions
 from thetahat.logs.log import Log, handle
 from thetahat.models.forms import ConvertibleModel
 from thetahat.models.responses import Forecast, FrequencyResponse, TransientResponse
@@ -366,9 +366,10 @@ class Model(ConvertibleModel):
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        words = _options.words(ValidationOptions, options, len(log) if isinstance(log, Log) else None)
-        words += [f"--require={one}" for one in ([require] if isinstance(require, str) else require or ())]
-        return Validation._of(_thetahat.validate(self._model, handle("log", log), words))
+        plan = _options.plan(options, len(log) if isinstance(log, Log) else None)
+        listed = [require] if isinstance(require, str) else require or ()
+        required = [one for text in listed for one in _options.text("require", text).split(",")]
+        return Validation._of(_thetahat.validate(self._model, handle("log", log), plan, required))
 
     def frequency_response(
         self, w: npt.ArrayLike | None = None, *, points: int = 100, output: int | str | None = None

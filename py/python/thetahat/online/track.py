@@ -176,29 +176,27 @@ class Tracker:
                 raise ValueError(f"inputs: expected {len(warm.inputs)} names as warm has inputs, found {len(named)}")
         elif named is None:
             named = _inputs(nb if narx is None else 2 if nu is None else nu)
-        words = _options.order_words(**orders)
-        if narx is not None:
-            words += [f"--narx={_options.text('narx', narx)}", *_options.order_words(**lags)]
-        if not isinstance(constant, bool):
-            raise TypeError(f"constant: expected True or False, found {constant!r}")
-        words += ["--constant"] if constant else []
-        spoken = (("method", method), ("start", start), ("outliers", outliers), ("couple", couple))
-        words += [f"--{name}={_options.text(name, value)}" for name, value in spoken if value is not None]
-        words.append(f"--forgetting={','.join(_policies(forgetting))}")
-        for name, values in (("offset", offset), ("scale", scale)):
-            if values is not None and not isinstance(values, Mapping):
-                raise TypeError(f"{name}: expected a dict, found {values!r}")
-            words += [f"--{name}={_options.text(name, key)}={_options.number(name, value)}" for key, value in (values or {}).items()]
-        if dead_zone is not None:
-            words.append(f"--dead-zone={_options.number('dead_zone', dead_zone)}")
-        if horizon is not None:
-            words.append(f"--horizon={_options.count('horizon', horizon, 10_000)}")
-        if alarm is not None:
-            words.append(f"--alarm={_options.number('alarm', alarm)}")
+        plan = _options.plan(
+            {
+                **orders,
+                "narx": narx,
+                **lags,
+                "constant": _options.flag("constant", constant) or None,
+                "method": method,
+                "start": start,
+                "outliers": outliers,
+                "couple": couple,
+                "forgetting": ",".join(_policies(forgetting)),
+                "offset": offset,
+                "scale": scale,
+                "dead_zone": dead_zone,
+                "horizon": None if horizon is None else _options.count("horizon", horizon, 10_000),
+                "alarm": alarm,
+            }
+        )
         self._sample_time = None if sample_time is None else _options.seconds("sample_time", sample_time)
-        if self._sample_time is not None:
-            words.append(f"--sample-time={self._sample_time!r}")
-        elif warm is not None:
+        given = self._sample_time
+        if given is None and warm is not None:
             self._sample_time = warm.sample_time
         named = [_options.text("inputs", name) for name in named]
         if output is None:
@@ -207,7 +205,7 @@ class Tracker:
             measured = [_options.text("output", name) for name in ([output] if isinstance(output, str) else list(output))]
         if len({*named, *measured}) < len(named) + len(measured):
             raise ValueError(f"inputs: {_numbers.twice([*named, *measured])!r} is named twice; each channel has one role")
-        self._tracker = _thetahat.Tracker(words, named, measured, None if warm is None else warm._model)
+        self._tracker = _thetahat.Tracker(plan, given, named, measured, None if warm is None else warm._model)
 
     @classmethod
     def from_state(cls, text: str) -> Tracker:

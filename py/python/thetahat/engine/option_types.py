@@ -1,9 +1,9 @@
-"""The options of fits, written from the one table of options: ``cargo run -p thetahat --example python_options``."""
+"""The options of what takes many, written from their tables: ``cargo run -p thetahat --example python_options``."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal, Optional, TypedDict, Union
 
-from thetahat.engine.values import Band, Bound, Rows
+from thetahat.engine.values import Band, Bound, Duration, Frequencies, Rows
 
 
 class FitOptions(TypedDict, total=False):
@@ -467,3 +467,120 @@ class EquationsOptions(TypedDict, total=False):
     starts: Optional[int]
     seed: Optional[int]
     time_limit: Optional[float]
+
+
+class ValidationOptions(TypedDict, total=False):
+    """How to validate a model on a log.
+
+    Attributes
+    ----------
+    rows
+        Rows to validate on, 1-based and inclusive [default: all]
+    detrend
+        Offsets: the model's own, or none, mean, linear, start:K of the rows evaluated [default: model]
+    horizon
+        Prediction horizons besides 1, in steps [default: 5]
+    lags
+        Lags of the tests of residuals; short logs have fewer [default: 25]
+    alpha
+        Reject where less than this chance is left [default: 0.05]
+    alphas
+        The levels of the bands of which Anderson's test counts what lies outside [default:
+        0.01,0.02,0.05,0.1,0.2]
+    """
+
+    rows: Optional[Rows]
+    detrend: Optional[Union[Literal["model", "none", "mean", "linear"], str]]
+    horizon: Optional[Union[int, Sequence[int]]]
+    lags: Optional[int]
+    alpha: Optional[float]
+    alphas: Optional[Sequence[float]]
+
+
+class SpectrumOptions(TypedDict, total=False):
+    """How a frequency response is estimated from a log.
+
+    Attributes
+    ----------
+    rows
+        Rows to use, 1-based and inclusive; each range is a segment of its own [default: all]
+    detrend
+        What is taken from each channel first: none, mean, linear, start:K [default: mean]
+    method
+        How the response is estimated; ``"lpm"``: Local polynomials for response and transient; ``"spa"``:
+        Blackman and Tukey: transforms of windowed covariances; ``"welch"``: Welch: averages over windows
+        that overlap by half; ``"etfe"``: The ratio of the transforms, unsmoothed; ``"sines"``: Correlation
+        over whole periods of a stepped or a multi-sine input [default: lpm]
+    frequencies
+        Frequencies in radians per second: a band, or for lpm and spa a list [default: all that the log has]
+    points
+        For lpm and spa: how many frequencies of the band, each the same factor above the one before
+        [default: 200]
+    half_width
+        For lpm: lines of the transform on either side of a frequency [default: 12 for one input, 14 for two,
+        …]
+    lags
+        For spa: lags of the Hann window [default: as many as leave the response as it is when they are
+        doubled]
+    window
+        For welch: rows of a window [default: a power of two, about an eighth of the log]
+    estimator
+        For welch: which ratio of the spectra; ``"h1"``: The noise is in the output; ``"h2"``: It is in the
+        input [default: h1]
+    period
+        For sines: rows of a period [default: those after which the input repeats itself]
+    discard
+        For sines: periods to leave out at the beginning [default: those that differ from the later ones]
+    """
+
+    rows: Optional[Rows]
+    detrend: Optional[Union[Literal["mean", "linear", "none"], str]]
+    method: Optional[Literal["lpm", "spa", "welch", "etfe", "sines"]]
+    frequencies: Optional[Frequencies]
+    points: Optional[int]
+    half_width: Optional[int]
+    lags: Optional[int]
+    window: Optional[int]
+    estimator: Optional[Literal["h1", "h2"]]
+    period: Optional[int]
+    discard: Optional[int]
+
+
+class DesignOptions(TypedDict, total=False):
+    """What a test signal has to be.
+
+    Attributes
+    ----------
+    length
+        How many samples [default: 1023, a period of a PRBS; with ``model`` the length whose errors are told]
+    range
+        The lowest and the highest value, in units of the input [default: -1..1]
+    rms
+        A power budget: give the deviations from the middle of the range this root mean square, instead of
+        its width
+    band
+        The lowest and the highest frequency of multisine, chirp and sines, in radians per second [default:
+        all]
+    points
+        How many frequencies, each the same factor above the one before, of multisine and sines [default:
+        every line of the period; of sines 10]
+    period
+        Repeat the signal after this many samples [default: of prbs the longest that fits, of multisine 4096
+        at most, else the length]
+    channels
+        How many signals without correlation [default: 1, with ``model`` one for each input of the model]
+    sample_time
+        Seconds from one sample to the next [default: 1, with ``model`` that of the model]
+    seed
+        Which random signal, or where a PRBS begins [default: 0]
+    """
+
+    length: Optional[int]
+    range: Optional[tuple[float, float]]
+    rms: Optional[float]
+    band: Optional[tuple[float, float]]
+    points: Optional[int]
+    period: Optional[int]
+    channels: Optional[int]
+    sample_time: Optional[Duration]
+    seed: Optional[int]

@@ -1,12 +1,7 @@
-//! The values of options: how they are written as text and as JSON, and what a reader is told of them.
-
 use serde_json::{Map, Number, Value};
 
 use crate::Error;
-use crate::data::{Detrend, Prefilter, Rows, Split};
-use crate::estimate::{Bound, GainBound, Refine, Weighting};
-use crate::model::ProcessStructure;
-use crate::select::{Focus, OrderRange, Select};
+use crate::data::{Detrend, Rows};
 
 /// How often an option may stand on a command line, and what its value is there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,7 +30,7 @@ pub struct Word {
 }
 
 /// The value of an option, and whether there is one.
-pub(super) trait OptionValue: Default {
+pub(crate) trait OptionValue: Default {
     const FORM: Form;
     /// Its type in Python.
     const PYTHON: &'static str;
@@ -64,7 +59,7 @@ pub(super) trait OptionValue: Default {
 }
 
 /// One value, written as text.
-pub(super) trait OptionText: Sized {
+pub(crate) trait OptionText: Sized {
     /// Of a list of them.
     const LIST: Form = Form::Repeated;
     /// Its type in Python.
@@ -208,6 +203,13 @@ impl OptionText for String {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnName(pub String);
 
+impl ColumnName {
+    /// Those of a list, if there are any.
+    pub(crate) fn all(names: &[Self]) -> Option<Vec<String>> {
+        (!names.is_empty()).then(|| names.iter().map(|name| name.0.clone()).collect())
+    }
+}
+
 impl OptionText for ColumnName {
     const LIST: Form = Form::Names;
     const PYTHON: &'static str = "str";
@@ -218,30 +220,6 @@ impl OptionText for ColumnName {
 
     fn text(&self) -> String {
         self.0.clone()
-    }
-}
-
-/// The samples that an input waits, or a range of them: they are no coefficients, of which there are so many at most.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct DelayRange(pub OrderRange);
-
-impl OptionText for DelayRange {
-    const LIST: Form = Form::List;
-    const PYTHON: &'static str = "Order";
-    const PYTHON_LIST: &'static str = "Orders";
-
-    fn of(text: &str) -> Result<Self, String> {
-        let number = |text: &str| text.trim().parse::<usize>().ok();
-        let ends = match text.split_once("..") {
-            Some((first, last)) => number(first).zip(number(last)),
-            None => number(text).map(|delay| (delay, delay)),
-        };
-        let range = ends.and_then(|(first, last)| OrderRange::new(first, last).ok());
-        range.map(Self).ok_or_else(|| format!("'{text}' is no delay; write 2, or a range as 0..10"))
-    }
-
-    fn text(&self) -> String {
-        self.0.to_string()
     }
 }
 
@@ -272,7 +250,9 @@ impl OptionText for u64 {
 }
 
 impl OptionText for f64 {
+    const LIST: Form = Form::List;
     const PYTHON: &'static str = "float";
+    const PYTHON_LIST: &'static str = "Sequence[float]";
 
     fn of(text: &str) -> Result<Self, String> {
         let number = text.trim().parse().ok().filter(|number: &f64| number.is_finite());
@@ -281,6 +261,24 @@ impl OptionText for f64 {
 
     fn text(&self) -> String {
         self.to_string()
+    }
+}
+
+/// The two ends of a range of numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends(pub [f64; 2]);
+
+impl OptionText for Ends {
+    const PYTHON: &'static str = "tuple[float, float]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|end| end.is_finite());
+        let ends = text.split_once("..").and_then(|(low, high)| Some([number(low)?, number(high)?]));
+        ends.map(Self).ok_or_else(|| format!("'{text}': write it as LOW..HIGH, such as 0.1..3"))
+    }
+
+    fn text(&self) -> String {
+        format!("{}..{}", self.0[0], self.0[1])
     }
 }
 
@@ -312,14 +310,14 @@ impl OptionText for NamedValue {
 /// Values that read and write themselves, how a list of them stands on a command line, and their types in Python.
 macro_rules! texts {
     ($($own:ty, $list:ident, $python:literal, $python_list:literal;)*) => {$(
-        impl OptionText for $own {
-            const LIST: Form = Form::$list;
+        impl $crate::options::OptionText for $own {
+            const LIST: $crate::options::Form = $crate::options::Form::$list;
             const PYTHON: &'static str = $python;
             const PYTHON_LIST: &'static str = $python_list;
 
             fn of(text: &str) -> Result<Self, String> {
                 text.parse().map_err(|error| match error {
-                    Error::Argument { message, .. } => message,
+                    $crate::Error::Argument { message, .. } => message,
                     other => other.to_string(),
                 })
             }
@@ -331,38 +329,52 @@ macro_rules! texts {
     )*};
 }
 
+pub(crate) use texts;
+
 texts! {
-    Bound, Repeated, "str", "Mapping[str, Bound]";
     Detrend, Repeated, "Union[Literal[\"mean\", \"linear\", \"none\"], str]", "Sequence[str]";
-    Focus, Repeated, "Union[int, Literal[\"auto\", \"prediction\", \"simulation\"]]", "Sequence[str]";
-    GainBound, Repeated, "str", "Union[Bound, Mapping[str, Bound]]";
-    OrderRange, List, "Order", "Orders";
-    Prefilter, Repeated, "Band", "Sequence[str]";
-    ProcessStructure, List, "str", "Union[str, Sequence[str]]";
-    Refine, Repeated, "Literal[\"prediction\", \"simulation\"]", "Sequence[str]";
     Rows, List, "str", "Rows";
-    Split, Repeated, "Union[str, tuple[float, float, float]]", "Sequence[str]";
-    Weighting, Repeated, "Literal[\"ssarx\", \"moesp\", \"n4sid\", \"cva\"]", "Sequence[str]";
-}
-
-impl OptionText for Select {
-    const PYTHON: &'static str = "";
-
-    fn words() -> Vec<Word> {
-        Self::all().map(|select| Word { word: select.word(), alias: None, help: select.says() }).collect()
-    }
-
-    fn of(text: &str) -> Result<Self, String> {
-        Self::all().find(|select| select.word() == text).ok_or_else(|| none_of(text, &Self::words()))
-    }
-
-    fn text(&self) -> String {
-        self.word().to_owned()
-    }
 }
 
 /// What is wrong with a word that is none of these.
-pub(super) fn none_of(text: &str, words: &[Word]) -> String {
+pub(crate) fn none_of(text: &str, words: &[Word]) -> String {
     let words: Vec<&str> = words.iter().map(|own| own.word).collect();
     format!("'{text}' is none of {}", words.join(", "))
 }
+
+/// The words of a type, one for each of its variants.
+macro_rules! words {
+    ($own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
+        impl $own {
+            /// As it is written.
+            pub(crate) fn word(self) -> &'static str {
+                match self { $(Self::$variant => $word,)* }
+            }
+        }
+        $crate::options::words!(of $own { $($variant $word $(| $alias)? $help,)* });
+    };
+    (alias) => { None };
+    (alias $alias:literal) => { Some($alias) };
+    (of $own:ty { $($variant:ident $word:literal $(| $alias:literal)? $help:literal,)* }) => {
+        impl $crate::options::OptionText for $own {
+            const PYTHON: &'static str = "";
+
+            fn words() -> Vec<$crate::options::Word> {
+                vec![$($crate::options::Word { word: $word, alias: $crate::options::words!(alias $($alias)?), help: $help },)*]
+            }
+
+            fn of(text: &str) -> Result<Self, String> {
+                match text {
+                    $($word $(| $alias)? => Ok(Self::$variant),)*
+                    other => Err($crate::options::none_of(other, &Self::words())),
+                }
+            }
+
+            fn text(&self) -> String {
+                match self { $(Self::$variant => $word,)* }.to_owned()
+            }
+        }
+    };
+}
+
+pub(crate) use words;

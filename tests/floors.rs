@@ -402,20 +402,9 @@ fn libraries_name_no_options() {
     );
 }
 
-/// Where the variants of `Model` and of `Procedure` may be named: beside what they are, where a fit makes one, and
+/// Where the variants of `Model` and of `Procedure` may be named: beside what they are, and
 /// where each kind has a presentation and a form of its own. All others ask for what a kind can do.
-const KINDS: [&str; 10] = [
-    "estimate",
-    "export",
-    "model",
-    "present::kinds",
-    "report::equations",
-    "report::nonlinear_arx",
-    "report::nonlinear_choice",
-    "report::normal_equations",
-    "report::process",
-    "report::state_space",
-];
+const KINDS: [&str; 4] = ["estimate", "export", "model", "present::kinds"];
 
 /// Variants of these enums that a source names outside of comments and tests.
 fn variants(source: &str) -> Vec<String> {

@@ -328,15 +328,8 @@ fn modelled(orders: Orders) -> (Report, Validated) {
 }
 
 fn polynomials(report: &mut Report) -> &mut PolynomialModel {
-    match &mut report.model {
-        Model::Polynomial(model) => Some(&mut **model),
-        Model::Equations(_)
-        | Model::NonlinearArx(_)
-        | Model::Process(_)
-        | Model::StateSpace(_)
-        | Model::ContinuousStateSpace(_) => None,
-    }
-    .expect("the case is sound")
+    let Model::Polynomial(model) = &mut report.model else { panic!("the case is one of polynomials") };
+    model
 }
 
 fn inspected() -> Inspection {

@@ -475,7 +475,7 @@ fn trackers_take_functions() {
         ("--narx poly --ny 0 --nu 0", "orders"),
         ("--narx poly --nu 1,2", "2 values for 1 inputs"),
         ("--degree 2 --na 1 --nb 1", "--narx"),
-        ("--warm model.json --narx poly", "cannot be used with"),
+        ("--warm model.json --narx poly", "--narx: does not work with --warm"),
         ("--warm model.json --scale u=1 --scale y=1", "its own scales"),
         ("--warm model.json --start exact", "--start"),
     ] {

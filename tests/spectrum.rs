@@ -145,7 +145,7 @@ fn what_does_not_go_together_is_refused() {
             2,
             "--frequencies: 4 rad/s is above 3.14159 rad/s",
         ),
-        ("spectrum log.csv --frequencies a..b", 2, "--frequencies a..b: write a band"),
+        ("spectrum log.csv --frequencies a..b", 2, "--frequencies: 'a..b': write a band"),
         ("spectrum log.csv --points 5", 2, "--points: it is for a band"),
         ("spectrum log.csv --lags 5", 2, "--lags: it is for --method spa"),
         (

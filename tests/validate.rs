@@ -208,15 +208,15 @@ fn an_unstable_model_is_told() {
 fn options_that_make_no_sense_are_usage_errors() {
     let folder = folder();
     for (words, parts) in [
-        ("oe.json log.csv --require white", ["output error", "ask for independent"]),
+        ("oe.json log.csv --require white", ["OE(2, 2, 1) says nothing of the noise", "ask for independent"]),
         ("iv.json log.csv --require stable,white", ["instrumental variables", "ask for independent"]),
         ("sriv.json log.csv --require white", ["instrumental variables", "ask for independent"]),
         ("ar.json log.csv --require independent", ["no inputs", "ask for white"]),
         ("arx.json log.csv --require blue", ["'blue'", "white, independent, stable, fit>=P"]),
         ("arx.json log.csv --require fit>=120", ["fit>=120", "ask for less"]),
         ("arx.json log.csv --require fit@9999999>=1", ["--horizon", "1000000"]),
-        ("arx.json log.csv --horizon 0", ["--horizon 0", "from 1 on"]),
-        ("arx.json log.csv --horizon inf", ["--horizon inf", "from 1 on"]),
+        ("arx.json log.csv --horizon 0", ["--horizon: 0", "from 1 on"]),
+        ("arx.json log.csv --horizon inf", ["--horizon: 'inf'", "whole number"]),
         ("arx.json log.csv --lags 0", ["--lags", "1..1000"]),
         ("arx.json log.csv --alpha 1", ["--alpha", "between 0 and 1"]),
         ("arx.json log.csv --alphas 0.1,-1", ["--alphas", "between 0 and 1"]),

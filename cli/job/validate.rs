@@ -28,7 +28,8 @@ impl EvaluationJob {
         }
         let requirements = required.iter().map(|text| parsed("--require", text));
         let requirements: Vec<Requirement> = requirements.collect::<Result<_, _>>()?;
-        let plan = ValidationPlan::of(&arguments.options.options()?, &requirements);
+        let further: Vec<usize> = requirements.iter().filter_map(Requirement::steps).collect();
+        let plan = ValidationPlan::of(&arguments.options.options()?, &further);
         let plan = plan.map_err(|error| Failure::option(&error))?;
         Ok(Self { log: LogJob::resolve(&arguments.log, &arguments.clock)?, plan, requirements })
     }

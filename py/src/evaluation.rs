@@ -43,8 +43,8 @@ pub(crate) fn validate(
         .map(|text| text.parse())
         .collect::<Result<_, _>>()
         .map_err(|error| error::batch(py, error))?;
-    let plan =
-        ValidationPlan::of(&options(py, plan)?, &requirements).map_err(|error| error::batch(py, error))?;
+    let further: Vec<usize> = requirements.iter().filter_map(Requirement::steps).collect();
+    let plan = ValidationPlan::of(&options(py, plan)?, &further).map_err(|error| error::batch(py, error))?;
     let log = log.get();
     let report = model.get().report(py)?;
     for requirement in &requirements {

@@ -352,7 +352,7 @@ def test_bad_trackers() -> None:
         ({"na": 1, "nb": 1, "offset": {"v": 1.0}}, ValueError, "^offset: 'v' is no channel of the model"),
         ({"na": 1, "nb": 1, "offset": 3.0}, TypeError, "^offset: expected a dict"),
         ({"na": 1, "nb": 1, "scale": {"u": 1.0}}, ValueError, "^scale: 'y' has none"),
-        ({"na": 1, "nb": 1, "scale": {"u": 0.0, "y": 1.0}}, ValueError, "^scale u=0"),
+        ({"na": 1, "nb": 1, "scale": {"u": 0.0, "y": 1.0}}, ValueError, "^scale: u=0"),
         ({"na": 1, "nb": [1, 1], "inputs": "u"}, ValueError, "^nb: 2 values for 1 inputs"),
         ({"na": 1, "nb": 1, "inputs": ["y"]}, ValueError, "^inputs: 'y' is named twice"),
         ({"na": 1, "nb": 1, "inputs": [3]}, TypeError, "^inputs: expected a str"),

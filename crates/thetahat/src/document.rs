@@ -10,6 +10,9 @@ pub use row::{Cell, Row};
 
 use crate::{Error, text};
 
+/// What writes documents: the program, and its version.
+pub(crate) const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
+
 /// A JSON document of this program: a schema with a major version, in its field `schema`, and its fields.
 ///
 /// ```

@@ -12,6 +12,8 @@ mod search;
 mod state_space;
 
 use std::borrow::Cow;
+use std::fmt;
+use std::sync::Arc;
 
 use thetahat_numerics::optimize::Monitor;
 
@@ -21,10 +23,9 @@ use crate::model::GreyBox;
 use crate::options::{ColumnName, Kind};
 use crate::plan::{FitOptions, Fitted};
 use crate::report::{
-    EquationsPlan, NonlinearArxPlan, NormalEquations, PendingEvaluation, Plan, ProcessPlan, Report,
-    StateSpacePlan, fit_equations, fit_nonlinear_arx_monitored, fit_process, fit_process_to_response,
+    EquationsPlan, NormalEquations, PendingEvaluation, Plan, ProcessPlan, Report, fit_equations,
+    fit_process_to_response,
 };
-use crate::select::Choice;
 use crate::spectrum::MeasuredResponse;
 use nonlinear_arx::NonlinearArxDraft;
 use polynomial::PolynomialDraft;
@@ -55,31 +56,96 @@ use state_space::StateSpaceDraft;
 #[derive(Debug)]
 pub struct FitDraft {
     options: FitOptions,
-    draft: Draft,
-}
-
-#[derive(Debug)]
-enum Draft {
-    Polynomial(Box<PolynomialDraft>),
-    StateSpace(Box<StateSpaceDraft>),
-    Process(Box<ProcessDraft>),
-    NonlinearArx(Box<NonlinearArxDraft>),
-    Equations(EquationsPlan),
+    draft: Box<dyn Draft>,
 }
 
 /// A fit of which everything is said.
 #[derive(Debug, Clone)]
 pub struct FitPlan {
     options: FitOptions,
-    plan: KindPlan,
+    plan: Arc<dyn KindPlan>,
 }
 
-#[derive(Debug, Clone)]
-enum KindPlan {
-    Polynomial(Plan),
-    StateSpace(StateSpacePlan),
-    Process(ProcessPlan),
-    NonlinearArx(NonlinearArxPlan),
+/// A fit of one kind of model of which the channels are open.
+trait Draft: fmt::Debug + Send + Sync {
+    /// Whether the model has inputs.
+    fn is_driven(&self) -> bool {
+        true
+    }
+
+    /// What asks for a model without inputs, as a message names it.
+    fn asks_for_no_inputs(&self) -> &'static str {
+        "another `model`"
+    }
+
+    /// Whether rows may be any time apart.
+    fn takes_any_clock(&self) -> bool {
+        false
+    }
+
+    /// Whether the fit takes memory for little more than the log itself.
+    fn is_one_step(&self) -> bool {
+        false
+    }
+
+    /// Whether the options go with so many inputs.
+    fn check_inputs(&self, _count: usize) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// The plan for the channels of a log.
+    fn plan(&self, inputs: Vec<String>, outputs: Vec<String>) -> Result<Arc<dyn KindPlan>, Error>;
+
+    /// What is asked of a fit of equations, if it is one.
+    fn of_equations(&self) -> Option<&EquationsPlan> {
+        None
+    }
+
+    /// What is asked of a process, which a frequency response can say too; none of other kinds.
+    fn of_response(&self) -> Option<&ProcessPlan> {
+        None
+    }
+}
+
+/// A fit of one kind of model of which everything is said.
+trait KindPlan: fmt::Debug + Send + Sync {
+    /// Fits the model to a log and reports on it.
+    fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error>;
+
+    /// The same with figures that wait until somebody asks for them, where they take long.
+    fn begin(
+        &self,
+        log: Cow<'_, Log>,
+        sources: &[Source],
+        monitor: Monitor<'_>,
+    ) -> Result<PendingEvaluation, Error> {
+        self.fit(log, sources, monitor).map(PendingEvaluation::of)
+    }
+
+    /// Whether logs that are read part by part make this model.
+    fn check_pieces(&self) -> Result<(), Error> {
+        Err(whole_log())
+    }
+
+    /// How many rows of the part before it a part of a log needs.
+    fn lags(&self) -> usize {
+        0
+    }
+
+    /// The normal equations of a part of a log.
+    fn pieces(&self, _log: &Log, _sources: &[Source], _past: usize) -> Result<NormalEquations, Error> {
+        Err(whole_log())
+    }
+
+    /// It, if it is of a model of polynomials.
+    fn polynomial(&self) -> Option<&Plan> {
+        None
+    }
+}
+
+/// A model that is not made part by part.
+fn whole_log() -> Error {
+    Error::argument("stream", "this kind of model needs its whole log; leave it out")
 }
 
 impl FitDraft {
@@ -88,20 +154,14 @@ impl FitDraft {
     /// # Errors
     /// [`Error::Argument`] for options that do not go together, or with this kind of model.
     pub fn new(options: &FitOptions, fitted: Fitted) -> Result<Self, Error> {
-        let kind = options.kind(fitted)?.kind;
-        let draft = match options.narx {
-            Some(map) if kind == Kind::NONLINEAR_ARX => {
-                Draft::NonlinearArx(Box::new(NonlinearArxDraft::new(options, map)?))
-            }
-            _ if kind == Kind::EQUATIONS => Draft::Equations(equations(options)?),
-            _ if kind == Kind::PROCESS || kind == Kind::RESPONSE => {
-                Draft::Process(Box::new(ProcessDraft::new(options, fitted)?))
-            }
-            _ if kind == Kind::STATE_SPACE || kind == Kind::VECTOR_ARX => {
-                let is_arx = kind == Kind::VECTOR_ARX;
-                Draft::StateSpace(Box::new(StateSpaceDraft::new(options, is_arx)?))
-            }
-            _ => Draft::Polynomial(Box::new(PolynomialDraft::new(options)?)),
+        let draft: Box<dyn Draft> = match options.kind(fitted)?.kind {
+            Kind::POLYNOMIAL | Kind::IMPULSE_RESPONSE => Box::new(PolynomialDraft::new(options)?),
+            Kind::STATE_SPACE => Box::new(StateSpaceDraft::new(options, false)?),
+            Kind::VECTOR_ARX => Box::new(StateSpaceDraft::new(options, true)?),
+            Kind::PROCESS | Kind::RESPONSE => Box::new(ProcessDraft::new(options, fitted)?),
+            Kind::NONLINEAR_ARX => Box::new(NonlinearArxDraft::new(options)?),
+            Kind::EQUATIONS => Box::new(equations(options)?),
+            _ => return Err(Error::argument("model", "a log does not say a model of this kind")),
         };
         Ok(Self { options: options.clone(), draft })
     }
@@ -113,31 +173,22 @@ impl FitDraft {
 
     /// Whether the model has inputs.
     pub fn is_driven(&self) -> bool {
-        match &self.draft {
-            Draft::Polynomial(draft) => draft.orders.has_inputs(),
-            Draft::StateSpace(draft) => draft.driven,
-            Draft::Process(_) | Draft::Equations(_) => true,
-            Draft::NonlinearArx(draft) => draft.driven,
-        }
+        self.draft.is_driven()
     }
 
     /// What asks for a model without inputs, as a message names it.
     pub fn asks_for_no_inputs(&self) -> &'static str {
-        match &self.draft {
-            Draft::Polynomial(_) | Draft::StateSpace(_) => "`nb` 0",
-            Draft::NonlinearArx(_) => "`nu` 0",
-            Draft::Process(_) | Draft::Equations(_) => "another `model`",
-        }
+        self.draft.asks_for_no_inputs()
     }
 
     /// Whether rows may be any time apart.
     pub fn takes_any_clock(&self) -> bool {
-        matches!(self.draft, Draft::Process(_) | Draft::Equations(_))
+        self.draft.takes_any_clock()
     }
 
     /// Whether the fit takes memory for little more than the log itself.
     pub fn is_one_step(&self) -> bool {
-        matches!(&self.draft, Draft::Polynomial(draft) if draft.is_one_step())
+        self.draft.is_one_step()
     }
 
     /// Whether the options go with so many inputs.
@@ -145,10 +196,7 @@ impl FitDraft {
     /// # Errors
     /// [`Error::Argument`] for lists that are not one value for each.
     pub fn check_inputs(&self, count: usize) -> Result<(), Error> {
-        match &self.draft {
-            Draft::Polynomial(draft) => draft.orders.of(count).map(|_| ()),
-            Draft::StateSpace(_) | Draft::Process(_) | Draft::NonlinearArx(_) | Draft::Equations(_) => Ok(()),
-        }
+        self.draft.check_inputs(count)
     }
 
     /// The plan for the channels of a log.
@@ -159,16 +207,7 @@ impl FitDraft {
         let inputs = if self.is_driven() { inputs } else { Vec::new() };
         let names = |names: &[String]| names.iter().cloned().map(ColumnName).collect();
         let options = FitOptions { input: names(&inputs), output: names(&outputs), ..self.options };
-        let plan = match self.draft {
-            Draft::Polynomial(draft) => KindPlan::Polynomial(draft.plan(inputs, outputs)?),
-            Draft::StateSpace(draft) => KindPlan::StateSpace(draft.plan(inputs, outputs)?),
-            Draft::Process(draft) => KindPlan::Process(draft.plan(inputs, outputs)?),
-            Draft::NonlinearArx(draft) => KindPlan::NonlinearArx(draft.plan(inputs, outputs)?),
-            Draft::Equations(_) => {
-                return Err(Error::argument("grey", "equations name their own channels"));
-            }
-        };
-        Ok(FitPlan { options, plan })
+        Ok(FitPlan { options, plan: self.draft.plan(inputs, outputs)? })
     }
 
     /// Fits the unknown parameters of a model in equations.
@@ -191,10 +230,8 @@ impl FitDraft {
     /// # Errors
     /// [`Error::Argument`] for options of another kind of model.
     pub fn equations_plan(&self) -> Result<&EquationsPlan, Error> {
-        match &self.draft {
-            Draft::Equations(plan) => Ok(plan),
-            _ => Err(Error::argument("grey", "the options ask for another kind of model")),
-        }
+        let plan = self.draft.of_equations();
+        plan.ok_or_else(|| Error::argument("grey", "the options ask for another kind of model"))
     }
 
     /// Fits a process to a frequency response.
@@ -202,10 +239,10 @@ impl FitDraft {
     /// # Errors
     /// As for [`fit_process_to_response`]; [`Error::Argument`] for options of another kind of model.
     pub fn fit_response(self, response: &MeasuredResponse, monitor: Monitor<'_>) -> Result<Report, Error> {
-        let Draft::Process(draft) = self.draft else {
+        let Some(plan) = self.draft.of_response() else {
             return Err(Error::argument("from", "the options ask for another kind of model than a process"));
         };
-        let report = fit_process_to_response(response, &draft.plan_of_response(), monitor)?;
+        let report = fit_process_to_response(response, plan, monitor)?;
         Ok(Report { plan: Some(self.options), ..report })
     }
 }
@@ -218,17 +255,8 @@ impl FitPlan {
     /// Those of the kind of model: [`Error::Argument`] and [`Error::Data`] for channels or rows that are not there,
     /// [`Error::Undetermined`] if the data cannot determine the parameters.
     pub fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
-        let report = match &self.plan {
-            KindPlan::Polynomial(plan) => {
-                crate::report::identify_monitored(log.into_owned(), sources, plan, monitor)
-            }
-            KindPlan::StateSpace(plan) => {
-                crate::report::fit_state_space_monitored(&log, sources, plan, monitor)
-            }
-            KindPlan::Process(plan) => fit_process(&log, sources, plan, monitor),
-            KindPlan::NonlinearArx(plan) => fit_nonlinear_arx_monitored(&log, sources, plan, monitor),
-        };
-        Ok(Report { plan: Some(self.options.clone()), ..report? })
+        let report = self.plan.fit(log, sources, monitor)?;
+        Ok(Report { plan: Some(self.options.clone()), ..report })
     }
 
     /// The same with figures that wait until somebody asks for them, where they take long.
@@ -241,15 +269,7 @@ impl FitPlan {
         sources: &[Source],
         monitor: Monitor<'_>,
     ) -> Result<PendingEvaluation, Error> {
-        let pending = match &self.plan {
-            KindPlan::Polynomial(plan) => PendingEvaluation::new(log.into_owned(), sources, plan, monitor)?,
-            KindPlan::StateSpace(plan) => PendingEvaluation::of_states(&log, sources, plan, monitor)?,
-            KindPlan::Process(plan) => PendingEvaluation::of(fit_process(&log, sources, plan, monitor)?),
-            KindPlan::NonlinearArx(plan) => {
-                PendingEvaluation::of(fit_nonlinear_arx_monitored(&log, sources, plan, monitor)?)
-            }
-        };
-        Ok(pending.with_plan(&self.options))
+        Ok(self.plan.begin(log, sources, monitor)?.with_plan(&self.options))
     }
 
     /// The channels of the log that the fit reads, the inputs first.
@@ -262,29 +282,12 @@ impl FitPlan {
     /// # Errors
     /// [`Error::Argument`] for what needs the log more than once.
     pub fn check_pieces(&self) -> Result<(), Error> {
-        match &self.plan {
-            KindPlan::Polynomial(Plan { choice: Choice::Known(_), .. })
-            | KindPlan::StateSpace(_)
-            | KindPlan::NonlinearArx(_) => Ok(()),
-            KindPlan::Polynomial(_) => Err(Error::argument(
-                "stream",
-                "one pass over the log makes one model; give its orders, such as `na` 2 and `nb` 2",
-            )),
-            KindPlan::Process(_) => Err(Error::argument(
-                "stream",
-                "a process in continuous time needs its whole log; leave it out",
-            )),
-        }
+        self.plan.check_pieces()
     }
 
     /// How many rows of the part before it a part of a log needs.
     pub fn lags(&self) -> usize {
-        match &self.plan {
-            KindPlan::Polynomial(Plan { choice: Choice::Known(orders), .. }) => orders.maximum_lag(),
-            KindPlan::Polynomial(_) | KindPlan::Process(_) => 0,
-            KindPlan::StateSpace(plan) => plan.lags(),
-            KindPlan::NonlinearArx(plan) => plan.lags(),
-        }
+        self.plan.lags()
     }
 
     /// The normal equations of a part of a log, of which the first `past` rows are of the part before it.
@@ -292,12 +295,7 @@ impl FitPlan {
     /// # Errors
     /// As for [`NormalEquations::new`], and as for [`check_pieces`](Self::check_pieces).
     pub fn pieces(&self, log: &Log, sources: &[Source], past: usize) -> Result<NormalEquations, Error> {
-        match &self.plan {
-            KindPlan::Polynomial(plan) => NormalEquations::new(log, sources, plan, past),
-            KindPlan::StateSpace(plan) => NormalEquations::of_states(log, sources, plan, past),
-            KindPlan::NonlinearArx(plan) => NormalEquations::of_nonlinear_arx(log, sources, plan, past),
-            KindPlan::Process(_) => Err(self.check_pieces().err().unwrap_or(Error::Interrupted)),
-        }
+        self.plan.pieces(log, sources, past)
     }
 
     /// The options that it was made of, with the channels of the log.
@@ -310,10 +308,10 @@ impl FitPlan {
     /// # Errors
     /// [`Error::Argument`] for another kind of model.
     pub fn polynomial(&self) -> Result<&Plan, Error> {
-        match &self.plan {
-            KindPlan::Polynomial(plan) => Ok(plan),
-            _ => Err(Error::argument("model", "this is for models of polynomials; name one, such as oe")),
-        }
+        let plan = self.plan.polynomial();
+        plan.ok_or_else(|| {
+            Error::argument("model", "this is for models of polynomials; name one, such as oe")
+        })
     }
 }
 
@@ -349,6 +347,20 @@ fn common(options: &FitOptions) -> Result<Common, Error> {
 fn equations(options: &FitOptions) -> Result<EquationsPlan, Error> {
     let Common { estimate, validate, split, .. } = common(options)?;
     Ok(EquationsPlan { estimate, validate, split, search: search::search(options)? })
+}
+
+impl Draft for EquationsPlan {
+    fn takes_any_clock(&self) -> bool {
+        true
+    }
+
+    fn plan(&self, _: Vec<String>, _: Vec<String>) -> Result<Arc<dyn KindPlan>, Error> {
+        Err(Error::argument("grey", "equations name their own channels"))
+    }
+
+    fn of_equations(&self) -> Option<&EquationsPlan> {
+        Some(self)
+    }
 }
 
 /// What is wrong with the value of an option.

@@ -5,7 +5,6 @@
 
 mod asked;
 mod fit;
-mod kind;
 #[cfg(test)]
 mod tests;
 mod words;

@@ -13,6 +13,7 @@ use super::closed_loop::{Closed, closed_loop};
 use super::document::{Control, Polynomials, Robustness};
 use super::plant::{Plant, monic, trimmed};
 use crate::data::Offset;
+use crate::document::GENERATOR;
 use crate::figures::short;
 use crate::model::polynomial::{is_stable, product, roots};
 use crate::model::{LinearModel, Model, PolynomialModel};
@@ -178,7 +179,7 @@ pub fn control(model: &Model, plan: &ControlPlan) -> Result<Control, Error> {
     let observer = whole(controller.observer());
     Ok(Control {
         schema: Control::SCHEMA.into(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         model: model.name(),
         design: designed.words,
         input: of_input,

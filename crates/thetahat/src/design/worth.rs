@@ -8,6 +8,7 @@ use super::figures::SignalFigures;
 use super::planned::Prior;
 use super::signal::{SignalPlan, TestSignal};
 use super::want::{Figure, Want, figures};
+use crate::document::GENERATOR;
 use crate::document::document_methods;
 use crate::model::PolynomialModel;
 use crate::{Document, Error};
@@ -113,7 +114,7 @@ pub fn compare_signals(
     let signals = plans.par_iter().map(worth).collect::<Result<Vec<_>, Error>>()?;
     Ok(ExperimentDesign {
         schema: ExperimentDesign::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         model: model.orders.to_string(),
         sample_time: model.sample_time,
         length: plans.first().map_or(0, |plan| plan.length),

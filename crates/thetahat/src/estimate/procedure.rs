@@ -1,9 +1,71 @@
-//! What follows from how an estimate was found, for those who use it.
+//! How an estimate was found, and what follows from it for those who use it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use thetahat_numerics::optimize::Stopped;
+use thetahat_numerics::regression::Solver;
 
 use super::{
-    ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, Procedure, ProcessOutcome,
-    RegularisedOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
+    ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, ProcessOutcome, RegularisedOutcome,
+    RobustOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
 };
+
+/// How an estimate was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "method", rename_all = "kebab-case")]
+pub enum Procedure {
+    /// In one step, as the predictor is linear in the parameters.
+    LeastSquares {
+        /// How the least-squares problem was solved.
+        solver: Solver,
+    },
+    /// By instrumental variables in four stages: A and B, whatever the colour of the noise.
+    InstrumentalVariables {
+        /// The order of the autoregression that the signals of the last stage are filtered by.
+        filter_order: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By refined instrumental variables: B and F, whatever the colour of the noise.
+    RefinedInstrumentalVariables {
+        /// Iterations done, from the best start.
+        iterations: usize,
+        /// Why they stopped.
+        stopped: Stopped,
+        /// The initial conditions that were estimated.
+        initial_conditions: usize,
+        /// The order of the autoregression of the residuals that the covariance rests on.
+        residual_order: usize,
+    },
+    /// By a search for the least sum of squared prediction errors.
+    PredictionError(SearchOutcome),
+    /// By regularised least squares, with the kernel of the largest marginal likelihood.
+    Regularised(RegularisedOutcome),
+    /// By convex optimization.
+    Constrained(ConvexOutcome),
+    /// By a search for the least sum of a loss that does not follow wild samples.
+    Robust(RobustOutcome),
+    /// By a search for the largest likelihood of all measured outputs.
+    ExactLikelihood(LikelihoodOutcome),
+    /// The largest likelihood of the innovations of a model in equations.
+    InnovationsLikelihood(EquationsOutcome),
+    /// In one step for functions of the regressors, which were chosen one after the other.
+    ForwardRegression(MapsOutcome),
+    /// In one step for local models, whose boxes were split one after the other.
+    Splits(MapsOutcome),
+    /// By the samples themselves.
+    Neighbours(MapsOutcome),
+    /// By a search for all numbers of a map, from several starts.
+    Training(MapsOutcome),
+    /// By a search for the least errors of the free run of a process in continuous time.
+    FreeRun(ProcessOutcome),
+    /// By a search for the least errors of the frequency response of a process.
+    FrequencyResponse(ProcessOutcome),
+    /// By a subspace method: the states first, then the matrices.
+    Subspace(SubspaceOutcome),
+    /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
+    VectorArx(VectorArxOutcome),
+}
 
 /// Which distribution the tests of residuals have where the model is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,6 +76,17 @@ pub(crate) enum NullDistribution {
     Instrumental,
     /// The parameters come from other samples, or the tests do not know what the errors owe to them.
     Known,
+}
+
+/// The covariance of parameters that were found from prefiltered signals, whose errors have a colour where e is white.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FilteredCovariance {
+    /// It is found again for errors with that colour.
+    OfColouredErrors,
+    /// The estimate has it.
+    Own,
+    /// Nobody knows it.
+    Unknown,
 }
 
 impl Procedure {
@@ -38,6 +111,30 @@ impl Procedure {
             | Self::FrequencyResponse(_)
             | Self::Subspace(_)
             | Self::VectorArx(_) => NullDistribution::Known,
+        }
+    }
+
+    /// What is known of the covariance of parameters that were found from prefiltered signals.
+    pub(super) fn filtered_covariance(&self, output_error: bool) -> FilteredCovariance {
+        match self {
+            Self::LeastSquares { .. } | Self::PredictionError(_) => FilteredCovariance::OfColouredErrors,
+            Self::InstrumentalVariables { .. } | Self::RefinedInstrumentalVariables { .. } => {
+                FilteredCovariance::Own
+            }
+            Self::Robust(_) if output_error => FilteredCovariance::Own,
+            Self::Robust(_)
+            | Self::Constrained(_)
+            | Self::Regularised(_)
+            | Self::ExactLikelihood(_)
+            | Self::InnovationsLikelihood(_)
+            | Self::ForwardRegression(_)
+            | Self::Splits(_)
+            | Self::Neighbours(_)
+            | Self::Training(_)
+            | Self::FreeRun(_)
+            | Self::FrequencyResponse(_)
+            | Self::Subspace(_)
+            | Self::VectorArx(_) => FilteredCovariance::Unknown,
         }
     }
 
@@ -141,5 +238,57 @@ impl Procedure {
     /// The choices of the functions of a nonlinear ARX model, one for each output; none of other models.
     pub fn terms(&self) -> &[TermsOutcome] {
         self.maps().map_or(&[], |outcome| &outcome.maps)
+    }
+}
+
+impl From<EquationsOutcome> for Procedure {
+    fn from(outcome: EquationsOutcome) -> Self {
+        Self::InnovationsLikelihood(outcome)
+    }
+}
+
+impl From<SubspaceOutcome> for Procedure {
+    fn from(outcome: SubspaceOutcome) -> Self {
+        Self::Subspace(outcome)
+    }
+}
+
+impl From<VectorArxOutcome> for Procedure {
+    fn from(outcome: VectorArxOutcome) -> Self {
+        Self::VectorArx(outcome)
+    }
+}
+
+impl ProcessOutcome {
+    /// How a process was found from a log.
+    pub(crate) fn of_log(self) -> Procedure {
+        Procedure::FreeRun(self)
+    }
+
+    /// How a process was found from a measured frequency response.
+    pub(crate) fn of_response(self) -> Procedure {
+        Procedure::FrequencyResponse(self)
+    }
+}
+
+impl MapsOutcome {
+    /// Functions that were chosen.
+    pub(crate) fn chosen(self) -> Procedure {
+        Procedure::ForwardRegression(self)
+    }
+
+    /// Local models, whose boxes were split.
+    pub(crate) fn split(self) -> Procedure {
+        Procedure::Splits(self)
+    }
+
+    /// Samples that are asked.
+    pub(crate) fn of_neighbours(self) -> Procedure {
+        Procedure::Neighbours(self)
+    }
+
+    /// Maps that were trained.
+    pub(crate) fn trained(self) -> Procedure {
+        Procedure::Training(self)
     }
 }

@@ -1,13 +1,19 @@
 //! Nonlinear ARX models.
 
-use thetahat_numerics::optimize::Search;
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use thetahat_numerics::optimize::{Monitor, Search};
 
 use super::search;
-use super::{Common, common};
+use super::{Common, Draft, KindPlan, common};
 use crate::Error;
+use crate::data::{Log, Source};
 use crate::model::{Activation, Membership};
 use crate::plan::{FitOptions, MapWord};
-use crate::report::{Centres, InputLags, MapPlan, NonlinearArxPlan};
+use crate::report::{
+    Centres, InputLags, MapPlan, NonlinearArxPlan, NormalEquations, Report, fit_nonlinear_arx_monitored,
+};
 use crate::select::Focus;
 
 /// Bends of each regressor. Natural splines seldom need more than five knots (Stone, Statistical Science 1, 1986);
@@ -18,7 +24,7 @@ const BENDS: usize = 5;
 #[derive(Debug)]
 pub(super) struct NonlinearArxDraft {
     /// Whether there are inputs at all.
-    pub(super) driven: bool,
+    driven: bool,
     ny: Vec<usize>,
     nu: Vec<usize>,
     nk: Vec<usize>,
@@ -27,7 +33,8 @@ pub(super) struct NonlinearArxDraft {
 }
 
 impl NonlinearArxDraft {
-    pub(super) fn new(options: &FitOptions, map: MapWord) -> Result<Self, Error> {
+    pub(super) fn new(options: &FitOptions) -> Result<Self, Error> {
+        let map = options.narx.unwrap_or(MapWord::None);
         check_pairs(options)?;
         let default = NonlinearArxPlan::new(&[], &[]);
         let Common { estimate, validate, split, detrend, offsets } = common(options)?;
@@ -74,9 +81,18 @@ impl NonlinearArxDraft {
         }
         Ok(draft)
     }
+}
 
-    /// The plan for the channels of a log.
-    pub(super) fn plan(self, inputs: Vec<String>, outputs: Vec<String>) -> Result<NonlinearArxPlan, Error> {
+impl Draft for NonlinearArxDraft {
+    fn is_driven(&self) -> bool {
+        self.driven
+    }
+
+    fn asks_for_no_inputs(&self) -> &'static str {
+        "`nu` 0"
+    }
+
+    fn plan(&self, inputs: Vec<String>, outputs: Vec<String>) -> Result<Arc<dyn KindPlan>, Error> {
         let each = |option: &str, values: &[usize], default: usize, count: usize, of: &str| match values {
             [] => Ok(vec![default; count]),
             [one] => Ok(vec![*one; count]),
@@ -90,9 +106,27 @@ impl NonlinearArxDraft {
         let nk = each("nk", &self.nk, 1, inputs.len(), "inputs")?;
         let output_lags = each("ny", &self.ny, 2, outputs.len(), "outputs")?;
         let input_lags = nu.into_iter().zip(nk).map(|(lags, delay)| InputLags { lags, delay }).collect();
-        let plan = NonlinearArxPlan { inputs, outputs, output_lags, input_lags, ..self.plan };
+        let plan = NonlinearArxPlan { inputs, outputs, output_lags, input_lags, ..self.plan.clone() };
         plan.check()?;
-        Ok(plan)
+        Ok(Arc::new(plan))
+    }
+}
+
+impl KindPlan for NonlinearArxPlan {
+    fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
+        fit_nonlinear_arx_monitored(&log, sources, self, monitor)
+    }
+
+    fn check_pieces(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn lags(&self) -> usize {
+        self.lags()
+    }
+
+    fn pieces(&self, log: &Log, sources: &[Source], past: usize) -> Result<NormalEquations, Error> {
+        NormalEquations::of_nonlinear_arx(log, sources, self, past)
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) enum GivenOrders {
     Open { structure: Option<Structure>, inputs: bool, nk: Vec<usize>, linear: bool },
 }
 
-/// The orders that a structure has.
+/// The orders that a structure of polynomials has.
 fn orders_of(model: ModelWord) -> &'static [&'static str] {
     match model {
         ModelWord::Arx => &["na", "nb"],
@@ -25,9 +25,7 @@ fn orders_of(model: ModelWord) -> &'static [&'static str] {
         ModelWord::Bj => &["nb", "nc", "nd", "nf"],
         ModelWord::General => &["na", "nb", "nc", "nd", "nf"],
         ModelWord::Fir => &["taps"],
-        ModelWord::Process => &["structure"],
-        ModelWord::Tf => &["np"],
-        ModelWord::Ss => &["order"],
+        _ => &[],
     }
 }
 
@@ -42,15 +40,17 @@ fn structure(model: ModelWord) -> Result<Structure, Error> {
         ModelWord::Oe => Ok(Structure::Oe),
         ModelWord::Bj => Ok(Structure::Bj),
         ModelWord::Fir => refused("fir needs `taps`, such as 70: how long the response is"),
-        ModelWord::Process => {
-            refused("process needs `structure`, such as p1d: a gain, a lag and a dead time")
-        }
-        ModelWord::Tf => refused("tf needs `np`, the number of poles, such as 2"),
-        ModelWord::Ss => refused("ss has no polynomials, and is fitted alone; take another `model` here"),
         ModelWord::General => refused(
             "general needs orders: it is any of the others; give `na`, `nb`, `nc`, `nd`, `nf`, or no `model` for a choice among \
              the others",
         ),
+        other => {
+            let message = format!(
+                "{} has no polynomials, and is fitted alone; take another `model` here",
+                other.word()
+            );
+            Err(Error::argument("model", message))
+        }
     }
 }
 

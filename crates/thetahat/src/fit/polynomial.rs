@@ -1,18 +1,24 @@
 //! Models of polynomials, and impulse responses.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use thetahat_numerics::optimize::Monitor;
+
 use super::method;
 use super::orders::GivenOrders;
-use super::{Common, common};
+use super::{Common, Draft, KindPlan, common};
 use crate::Error;
+use crate::data::{Log, Source};
 use crate::estimate::{Constant, Initial, Method};
 use crate::plan::{FitOptions, LikelihoodWord};
-use crate::report::Plan;
+use crate::report::{NormalEquations, PendingEvaluation, Plan, Report, identify_monitored};
 use crate::select::{Automatic, Choice, Select};
 
 /// A model of polynomials of which the channels are open.
 #[derive(Debug)]
 pub(super) struct PolynomialDraft {
-    pub(super) orders: GivenOrders,
+    orders: GivenOrders,
     /// The rest of the plan.
     plan: Plan,
 }
@@ -68,15 +74,27 @@ impl PolynomialDraft {
         }
         Ok(draft)
     }
+}
 
-    /// Whether it is found in one step.
-    pub(super) fn is_one_step(&self) -> bool {
+impl Draft for PolynomialDraft {
+    fn is_driven(&self) -> bool {
+        self.orders.has_inputs()
+    }
+
+    fn asks_for_no_inputs(&self) -> &'static str {
+        "`nb` 0"
+    }
+
+    fn is_one_step(&self) -> bool {
         let squares = matches!(self.plan.method, Method::PredictionError(_));
         self.orders.is_linear() && !self.orders.is_choice() && squares
     }
 
-    /// The plan for the channels of a log.
-    pub(super) fn plan(self, inputs: Vec<String>, mut outputs: Vec<String>) -> Result<Plan, Error> {
+    fn check_inputs(&self, count: usize) -> Result<(), Error> {
+        self.orders.of(count).map(|_| ())
+    }
+
+    fn plan(&self, inputs: Vec<String>, mut outputs: Vec<String>) -> Result<Arc<dyn KindPlan>, Error> {
         if outputs.len() > 1 {
             return Err(several(Some(&outputs)));
         }
@@ -87,7 +105,44 @@ impl PolynomialDraft {
                 "the log has no inputs; give it some, or orders of a time series",
             ));
         }
-        Ok(Plan { choice: self.orders.of(inputs.len())?, inputs, output, ..self.plan })
+        Ok(Arc::new(Plan { choice: self.orders.of(inputs.len())?, inputs, output, ..self.plan.clone() }))
+    }
+}
+
+impl KindPlan for Plan {
+    fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
+        identify_monitored(log.into_owned(), sources, self, monitor)
+    }
+
+    fn begin(
+        &self,
+        log: Cow<'_, Log>,
+        sources: &[Source],
+        monitor: Monitor<'_>,
+    ) -> Result<PendingEvaluation, Error> {
+        PendingEvaluation::new(log.into_owned(), sources, self, monitor)
+    }
+
+    fn check_pieces(&self) -> Result<(), Error> {
+        match &self.choice {
+            Choice::Known(_) => Ok(()),
+            Choice::Grid(_) | Choice::Automatic(_) => Err(Error::argument(
+                "stream",
+                "one pass over the log makes one model; give its orders, such as `na` 2 and `nb` 2",
+            )),
+        }
+    }
+
+    fn lags(&self) -> usize {
+        if let Choice::Known(orders) = &self.choice { orders.maximum_lag() } else { 0 }
+    }
+
+    fn pieces(&self, log: &Log, sources: &[Source], past: usize) -> Result<NormalEquations, Error> {
+        NormalEquations::new(log, sources, self, past)
+    }
+
+    fn polynomial(&self) -> Option<&Plan> {
+        Some(self)
     }
 }
 

@@ -1,11 +1,17 @@
 //! Processes in continuous time.
 
-use super::{Common, common, of_option, search};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use thetahat_numerics::optimize::Monitor;
+
+use super::{Common, Draft, KindPlan, common, of_option, search};
 use crate::Error;
+use crate::data::{Log, Source};
 use crate::estimate::Initial;
 use crate::model::ProcessStructure;
 use crate::plan::{FitOptions, Fitted, ModelWord};
-use crate::report::ProcessPlan;
+use crate::report::{ProcessPlan, Report, fit_process};
 
 /// A process of which the channels are open.
 #[derive(Debug)]
@@ -75,17 +81,28 @@ impl ProcessDraft {
             },
         })
     }
+}
 
-    /// The plan for a frequency response, of all its inputs if none are named.
-    pub(super) fn plan_of_response(self) -> ProcessPlan {
-        self.plan
+impl Draft for ProcessDraft {
+    fn takes_any_clock(&self) -> bool {
+        true
     }
 
-    /// The plan for the channels of a log.
-    pub(super) fn plan(self, inputs: Vec<String>, mut outputs: Vec<String>) -> Result<ProcessPlan, Error> {
-        let plan = ProcessPlan { inputs, output: outputs.pop().unwrap_or_default(), ..self.plan };
+    fn plan(&self, inputs: Vec<String>, mut outputs: Vec<String>) -> Result<Arc<dyn KindPlan>, Error> {
+        let plan = ProcessPlan { inputs, output: outputs.pop().unwrap_or_default(), ..self.plan.clone() };
         plan.check()?;
-        Ok(plan)
+        Ok(Arc::new(plan))
+    }
+
+    /// Of all inputs of the response if none are named.
+    fn of_response(&self) -> Option<&ProcessPlan> {
+        Some(&self.plan)
+    }
+}
+
+impl KindPlan for ProcessPlan {
+    fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
+        fit_process(&log, sources, self, monitor)
     }
 }
 

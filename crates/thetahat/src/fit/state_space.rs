@@ -1,13 +1,18 @@
 //! Models in state space, and ARX models with several outputs.
 
+use std::borrow::Cow;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
+
+use thetahat_numerics::optimize::Monitor;
 
 use super::search::{self, within};
-use super::{Common, common};
+use super::{Common, Draft, KindPlan, common};
 use crate::Error;
+use crate::data::{Log, Source};
 use crate::estimate::{Coupling, Initial, SubspaceOptions, VectorArxInputs, VectorArxOptions};
 use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions};
-use crate::report::StateSpacePlan;
+use crate::report::{NormalEquations, PendingEvaluation, Report, StateSpacePlan, fit_state_space_monitored};
 use crate::select::{Focus, OrderRange};
 
 /// The orders of an ARX model that are looked at where none are given.
@@ -19,7 +24,7 @@ const MOST_LAGS: usize = 200;
 #[derive(Debug)]
 pub(super) struct StateSpaceDraft {
     /// Whether there are inputs at all.
-    pub(super) driven: bool,
+    driven: bool,
     /// Samples that inputs wait: none, one for all or one for each.
     delays: Vec<RangeInclusive<usize>>,
     /// The rest of the plan.
@@ -79,9 +84,19 @@ impl StateSpaceDraft {
         let delays = options.nk.iter().map(delay).collect::<Result<_, Error>>()?;
         Ok(Self { driven: !without_inputs, delays, plan })
     }
+}
 
-    /// The plan for the channels of a log. Without feedthrough an input acts one sample later by itself.
-    pub(super) fn plan(self, inputs: Vec<String>, outputs: Vec<String>) -> Result<StateSpacePlan, Error> {
+impl Draft for StateSpaceDraft {
+    fn is_driven(&self) -> bool {
+        self.driven
+    }
+
+    fn asks_for_no_inputs(&self) -> &'static str {
+        "`nb` 0"
+    }
+
+    /// Without feedthrough an input acts one sample later by itself.
+    fn plan(&self, inputs: Vec<String>, outputs: Vec<String>) -> Result<Arc<dyn KindPlan>, Error> {
         let count = inputs.len();
         let delays = match &*self.delays {
             [] => Vec::new(),
@@ -94,7 +109,7 @@ impl StateSpaceDraft {
                 ));
             }
         };
-        let mut plan = StateSpacePlan { inputs, outputs, ..self.plan };
+        let mut plan = StateSpacePlan { inputs, outputs, ..self.plan.clone() };
         if let Some(arx) = &mut plan.arx {
             if let VectorArxInputs::Each(nb) = &arx.nb
                 && nb.len() != count
@@ -120,7 +135,34 @@ impl StateSpaceDraft {
             plan.delays = delays.iter().map(|delay| delay - usize::from(!at_once)).collect();
         }
         plan.check()?;
-        Ok(plan)
+        Ok(Arc::new(plan))
+    }
+}
+
+impl KindPlan for StateSpacePlan {
+    fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
+        fit_state_space_monitored(&log, sources, self, monitor)
+    }
+
+    fn begin(
+        &self,
+        log: Cow<'_, Log>,
+        sources: &[Source],
+        monitor: Monitor<'_>,
+    ) -> Result<PendingEvaluation, Error> {
+        PendingEvaluation::of_states(&log, sources, self, monitor)
+    }
+
+    fn check_pieces(&self) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn lags(&self) -> usize {
+        self.lags()
+    }
+
+    fn pieces(&self, log: &Log, sources: &[Source], past: usize) -> Result<NormalEquations, Error> {
+        NormalEquations::of_states(log, sources, self, past)
     }
 }
 

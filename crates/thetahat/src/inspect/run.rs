@@ -10,6 +10,7 @@ use crate::data::{
     Channel, Finding, Interpolation, Log, Recording, Regular, Resample, Resampling, Rows, Source, Times,
     check,
 };
+use crate::document::GENERATOR;
 use crate::validate::feedback::feedback;
 use crate::{Document, Error};
 
@@ -152,7 +153,7 @@ pub(super) fn described(
 ) -> Result<Inspection, Error> {
     let mut inspection = Inspection {
         schema: Inspection::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         log: Source { rows: Rows::new(1, rows)?, resampled: None, ..source.clone() },
         rows,
         experiments: 1,

@@ -2,6 +2,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Document;
+use crate::document::GENERATOR;
 use crate::document::document_methods;
 
 /// The topics of a log in which each has a clock of its own, as those of flights and robots. The JSON document
@@ -56,7 +57,7 @@ impl TopicList {
         command: Option<String>,
         warnings: Vec<String>,
     ) -> Self {
-        let generator = concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned();
+        let generator = GENERATOR.to_owned();
         Self { schema: Self::SCHEMA.to_owned(), generator, file, topics, command, warnings }
     }
 }

@@ -209,29 +209,25 @@ impl Model {
 
     /// The recursion, without the samples that inputs wait.
     fn plant(&self) -> Result<Plant, Error> {
-        match self {
-            Self::Polynomial(model) => {
-                let (matrices, delays) = model.without_delays();
-                let (free_parameters, degrees_of_freedom) =
-                    (model.parameters.len(), model.degrees_of_freedom);
-                Ok(Plant { matrices, delays, free_parameters, degrees_of_freedom })
-            }
-            Self::StateSpace(model) => {
-                let (matrices, delays) = model.without_delays();
-                let (free_parameters, degrees_of_freedom) = (model.free_parameters, model.degrees_of_freedom);
-                Ok(Plant { matrices, delays, free_parameters, degrees_of_freedom })
-            }
-            Self::Equations(_) | Self::NonlinearArx(_) | Self::Process(_) | Self::ContinuousStateSpace(_) => {
-                Err(Error::argument(
-                    "model",
-                    format!(
-                        "models of polynomials, in state space and of processes are converted to other sample times, and this one is {}; fit \
+        let (matrices, delays, free_parameters, degrees_of_freedom) = if let Some(model) =
+            self.as_polynomial()
+        {
+            let (matrices, delays) = model.without_delays();
+            (matrices, delays, model.parameters.len(), model.degrees_of_freedom)
+        } else if let Some(model) = self.as_state_space() {
+            let (matrices, delays) = model.without_delays();
+            (matrices, delays, model.free_parameters, model.degrees_of_freedom)
+        } else {
+            return Err(Error::argument(
+                "model",
+                format!(
+                    "models of polynomials, in state space and of processes are converted to other sample times, and this one is {}; fit \
                          one of these, or resample the log",
-                        self.name()
-                    ),
-                ))
-            }
-        }
+                    self.name()
+                ),
+            ));
+        };
+        Ok(Plant { matrices, delays, free_parameters, degrees_of_freedom })
     }
 }
 

@@ -242,17 +242,38 @@ impl Model {
 
     /// Whether it expects errors of one size in all rows. Equations may not, and then the sizes depend on the inputs.
     pub(crate) fn expects_errors_of_one_size(&self) -> bool {
-        !matches!(self, Self::Equations(_))
+        match self {
+            Self::Equations(_) => false,
+            Self::Polynomial(_)
+            | Self::NonlinearArx(_)
+            | Self::Process(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => true,
+        }
     }
 
     /// Whether it knows the plant in the range of the rows alone that it was fitted to.
     pub(crate) fn ends_with_its_range(&self) -> bool {
-        matches!(self, Self::NonlinearArx(_))
+        match self {
+            Self::NonlinearArx(_) => true,
+            Self::Polynomial(_)
+            | Self::Equations(_)
+            | Self::Process(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => false,
+        }
     }
 
     /// Whether it describes deviations from offsets. Equations describe signals as they are.
     pub fn has_offsets(&self) -> bool {
-        !matches!(self, Self::Equations(_))
+        match self {
+            Self::Equations(_) => false,
+            Self::Polynomial(_)
+            | Self::NonlinearArx(_)
+            | Self::Process(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => true,
+        }
     }
 
     /// The model beside offsets that were found elsewhere: of its own it says nothing.
@@ -376,7 +397,13 @@ impl Model {
 
     /// Whether it takes logs whose clock is irregular.
     pub fn takes_any_clock(&self) -> bool {
-        matches!(self, Self::Equations(_) | Self::Process(_))
+        match self {
+            Self::Equations(_) | Self::Process(_) => true,
+            Self::Polynomial(_)
+            | Self::NonlinearArx(_)
+            | Self::StateSpace(_)
+            | Self::ContinuousStateSpace(_) => false,
+        }
     }
 
     /// What it is called: structure and orders, such as ARX(2, 2, 1), or how many states the equations have.

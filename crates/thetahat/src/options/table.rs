@@ -106,8 +106,8 @@ pub trait Options: Default + JsonSchema {
 
 /// A table of options, and the struct of those that were given, each where it was.
 ///
-/// A row is: what it does, as its doc; its name and the type of its value; how that is written; the default; the heading;
-/// the kinds that take it, in brackets, or nothing where all do.
+/// A row is: what it does, as its doc; its name and the type of its value; how that is written; the default; the
+/// heading; the kinds that take it, in brackets, or nothing where all do.
 macro_rules! options {
     ($(#[$about:meta])* $name:ident of $what:literal {
         $($(#[doc = $doc:literal])+ $field:ident: $kind:ty, $notation:literal, $default:literal, $heading:ident

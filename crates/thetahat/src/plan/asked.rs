@@ -52,14 +52,12 @@ impl FitOptions {
             return Asked { kind: Kind::NONLINEAR_ARX, because: because("`narx`") };
         }
         let own = self.model.map(|model| format!("`model` {}", model.word()));
-        match self.model {
-            Some(ModelWord::Process | ModelWord::Tf) => return Asked { kind: Kind::PROCESS, because: own },
-            Some(ModelWord::Ss) => return Asked { kind: Kind::STATE_SPACE, because: own },
-            Some(ModelWord::Fir) => return Asked { kind: Kind::IMPULSE_RESPONSE, because: own },
+        match self.model.map(ModelWord::kind) {
             None if !self.structure.is_empty() => {
                 return Asked { kind: Kind::PROCESS, because: because("`structure`") };
             }
             None if !self.np.is_empty() => return Asked { kind: Kind::PROCESS, because: because("`np`") },
+            Some(kind) if kind != Kind::POLYNOMIAL => return Asked { kind, because: own },
             _ => {}
         }
         // A model without inputs is asked for as of all structures.

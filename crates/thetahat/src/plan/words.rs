@@ -5,7 +5,7 @@ use thetahat_numerics::optimize::Algorithm;
 use crate::data::{Prefilter, Split};
 use crate::estimate::{Bound, Constant, GainBound, Initial, Loss, Refine, Weighting};
 use crate::model::{Membership, ProcessStructure};
-use crate::options::{Form, OptionText, Word, none_of, texts, words};
+use crate::options::{Form, Kind, OptionText, Word, none_of, texts, words};
 use crate::select::{Focus, OrderRange, Path, Select};
 
 /// The structure of a model.
@@ -48,6 +48,40 @@ words! { ModelWord {
     Tf "tf" "Transfer functions in continuous time, with `np` and `nz`",
     Ss "ss" "State space: x(t+1) = F x + G u + K e, y = H x + D u + e, with any number of outputs",
 }}
+
+impl ModelWord {
+    /// The kind of model that it asks for; an ARX model of several outputs is another one.
+    pub(super) fn kind(self) -> Kind {
+        match self {
+            Self::Arx | Self::Armax | Self::Arma | Self::Ar | Self::Oe | Self::Bj | Self::General => {
+                Kind::POLYNOMIAL
+            }
+            Self::Fir => Kind::IMPULSE_RESPONSE,
+            Self::Process | Self::Tf => Kind::PROCESS,
+            Self::Ss => Kind::STATE_SPACE,
+        }
+    }
+}
+
+/// The kinds of model, each with what asks for it.
+impl Kind {
+    /// Polynomials, A y = B/F u + C/D e.
+    pub const POLYNOMIAL: Self = Self::new("models of polynomials");
+    /// An impulse response.
+    pub const IMPULSE_RESPONSE: Self = Self::new("`model` fir");
+    /// State space.
+    pub const STATE_SPACE: Self = Self::new("`model` ss");
+    /// An ARX model with several outputs.
+    pub const VECTOR_ARX: Self = Self::new("`model` arx with several outputs");
+    /// A process in continuous time.
+    pub const PROCESS: Self = Self::new("`structure` and `np`");
+    /// A nonlinear ARX model.
+    pub const NONLINEAR_ARX: Self = Self::new("`narx`");
+    /// A model in equations.
+    pub const EQUATIONS: Self = Self::new("`grey`");
+    /// A process in continuous time of a measured frequency response.
+    pub const RESPONSE: Self = Self::new("`from`");
+}
 
 /// Which past outputs an output depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -20,12 +20,7 @@ pub(super) use polynomial::parameters;
 
 /// Appends what a report says of its model. `converted` is a model that has no figures of a fit.
 pub(super) fn present(on: &mut Sections, report: &Report, converted: bool) {
-    let is_chosen = match &report.model {
-        Model::Polynomial(_) | Model::Process(_) => true,
-        Model::StateSpace(_) => !converted && report.selection.is_some(),
-        _ => false,
-    };
-    if is_chosen || on.is_page() {
+    if !converted || on.is_page() {
         selection(on, report);
     }
     match &report.model {

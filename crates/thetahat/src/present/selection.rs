@@ -30,7 +30,9 @@ pub(super) fn selection(on: &mut Sections, report: &Report) {
     if !report.decisions.is_empty() {
         on.gap();
     }
-    let Some(selection) = &report.selection else { return };
+    // The linear models that a nonlinear one was compared with are on pages alone.
+    let shown = report.model.as_nonlinear_arx().is_none() || on.is_page();
+    let Some(selection) = report.selection.as_ref().filter(|_| shown) else { return };
     selection.steps.iter().for_each(|step| on.line(step));
     on.gap();
     if selection.failed > 0 && on.is_page() {

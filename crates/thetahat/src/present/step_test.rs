@@ -1,6 +1,7 @@
 //! Step tests, and what models do after steps.
 
 use crate::data::Log;
+use crate::document::GENERATOR;
 use crate::figures::{self, fixed, number, of_unit, short, three};
 use crate::model::{LinearModel, Quantity};
 use crate::present::Layout;
@@ -79,14 +80,8 @@ pub fn transient_page(
             document.chart(|| drawn);
         }
     }
-    Page {
-        title: format!("{kind} of {name}"),
-        warnings: &[],
-        document,
-        command,
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")),
-    }
-    .write()
+    Page { title: format!("{kind} of {name}"), warnings: &[], document, command, generator: GENERATOR }
+        .write()
 }
 
 /// The steps and the figures.

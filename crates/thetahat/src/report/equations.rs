@@ -10,20 +10,20 @@ use thetahat_numerics::optimize::{Monitor, Search};
 use super::evaluate::evaluate;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
+use crate::Error;
 use crate::data::{Log, Rows, Source, Split};
 use crate::estimate::{
     Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, NullDistribution, Procedure,
     Question,
     equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
 };
-use crate::model::{EquationsModel, GreyBox, Model};
+use crate::model::{EquationsModel, GreyBox};
 use crate::respond::{
     NisCount, NisSummary,
     equations::{EquationsOnLog, Experiment, Predictor, experiments, walk},
 };
 use crate::select::Focus;
 use crate::validate::{Part, Residuals};
-use crate::{Document, Error};
 
 /// Lags of the test of whiteness that a fit warns by, and its levels.
 const LAGS: usize = 20;
@@ -224,7 +224,7 @@ fn fit(
     // The mean square of errors of which the Gaussian likelihood is this one.
     let cost = (2.0 * found.value / samples - 1.0 - std::f64::consts::TAU.ln()).exp();
     let estimation = Estimation {
-        procedure: Procedure::InnovationsLikelihood(EquationsOutcome {
+        procedure: Procedure::from(EquationsOutcome {
             log_likelihood: -found.value,
             nis,
             covariance_factor: factor,
@@ -252,19 +252,8 @@ fn fit(
         let residuals = Residuals::of(tested, NullDistribution::Known, LAGS, &[LEVEL], LEVEL);
         residuals.ok().map(|residuals| residuals.ljung_box)
     }));
-    let mut report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions: Vec::new(),
-        model: Model::from(fitted.clone()),
-        estimation,
-        fit: Vec::new(),
-        purpose: String::new(),
-        warnings: words,
-    };
+    let mut report = Report::new(data, fitted.clone(), estimation);
+    report.warnings.extend(words);
     evaluate(&mut report, &own, Part::Estimation, Focus::Auto);
     for (part, rows) in report.data.held_out() {
         let on_log = EquationsOnLog::new(&fitted, log, &rows, &report.data.estimation)?;

@@ -4,12 +4,12 @@ use super::fitted_rows::estimation_start;
 use super::identify::estimation_of;
 use super::schema::{Data, Report};
 use super::warnings::warnings;
+use crate::Error;
 use crate::data::{Offset, Rows};
 use crate::estimate::Fitted;
 use crate::model::{Orders, Signal};
 use crate::respond::{Horizon, InitialCondition};
 use crate::validate::{Fit, Part};
-use crate::{Document, Error};
 
 /// That of a model of polynomials of some channels, the inputs first, less their offsets. `spread` is the root of the
 /// sum of squares of the output about its mean, over the samples that count.
@@ -29,19 +29,7 @@ pub(super) fn report_of(
     let mut model = estimate.to_model(orders, data.sample_time, inputs, output)?;
     model.offset_covariance.clone_from(open);
     model.output.offset.level = taken.level + offset.map_or(0.0, |found| found.offset.level);
-    let mut report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions: Vec::new(),
-        estimation: estimation_of(fitted, taken),
-        fit: Vec::new(),
-        purpose: String::new(),
-        warnings: Vec::new(),
-        model: model.clone().into(),
-    };
+    let mut report = Report::new(data, model.clone(), estimation_of(fitted, taken));
     report.warnings = warnings(&report, &model);
     let (start, errors) = (estimation_start(&report, &model), (estimate.samples(), estimate.mse()));
     report.fit.push(one_step(&model.output.name, &report.data.estimation, errors, spread, start));

@@ -16,13 +16,13 @@ use super::plan::Plan;
 use super::schema::{Data, Estimation, Missing, Report};
 use super::shares::Shares;
 use super::warnings::warnings;
+use crate::Error;
 use crate::data::{Decision, Detrend, FindingKind, Log, Offset, Prefiltered, Record, Rows, Source, digests};
 use crate::estimate::{self, Beside, Constant, Estimate, Fitted, Initial, Method, OutputOffset, enough};
 use crate::inspect::{is_few_sinusoids, outliers_of};
 use crate::model::{Interval, Orders, ProcessStructure, Quantity, Signal};
 use crate::respond::{Horizon, InitialCondition, innovations};
 use crate::select::{self, Automatic, Choice, Focus, SelectedModel, Selection, Task};
-use crate::{Document, Error};
 use in_states::InStates;
 use integrating::Integrating;
 use nonlinear::Nonlinear;
@@ -284,32 +284,22 @@ fn fit(
         }
     }
 
-    let mut report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data: Data {
-            logs: sources.to_vec(),
-            digests,
-            rows: log.rows(),
-            sample_time: log.sample_time(),
-            detrend: plan.detrend.to_string(),
-            prefilter: plan.prefilter,
-            estimation: estimation.clone(),
-            validation: validation.clone(),
-            split: parts,
-            segments: segments.iter().map(Rows::from_positions).collect(),
-            missing,
-            time_gaps: log.gaps(),
-        },
-        selection,
-        decisions,
-        estimation: estimation_of(&fitted, output.offset),
-        fit: Vec::new(),
-        purpose: String::new(),
-        warnings: Vec::new(),
-        model: model.clone().into(),
+    let data = Data {
+        logs: sources.to_vec(),
+        digests,
+        rows: log.rows(),
+        sample_time: log.sample_time(),
+        detrend: plan.detrend.to_string(),
+        prefilter: plan.prefilter,
+        estimation: estimation.clone(),
+        validation: validation.clone(),
+        split: parts,
+        segments: segments.iter().map(Rows::from_positions).collect(),
+        missing,
+        time_gaps: log.gaps(),
     };
+    let estimated = estimation_of(&fitted, output.offset);
+    let mut report = Report { selection, decisions, ..Report::new(data, model.clone(), estimated) };
     report.warnings = warnings(&report, &model);
     let fitted = |first: usize| estimation.iter().any(|rows| rows.last() >= first);
     report

@@ -12,6 +12,7 @@ use thetahat_numerics::optimize::{Monitor, Stopped};
 use super::evaluate::evaluate;
 use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
+use crate::Error;
 use crate::data::{Channel, Log, Offset, Rows, Source};
 use crate::estimate::{
     Criteria, MapsOutcome, Procedure,
@@ -24,7 +25,6 @@ use crate::respond::{
 };
 use crate::select::Focus;
 use crate::validate::Part;
-use crate::{Document, Error};
 
 use self::map::fit_map;
 pub use plan::{Centres, InputLags, MapPlan, NonlinearArxPlan};
@@ -50,10 +50,10 @@ pub(super) fn fit_planned(
         .map(|output| fit_map(plan, &head.of_output(output)?, &deviations, &shares, monitor))
         .collect::<Result<Vec<_>, Error>>()?;
     let by = match plan.map {
-        MapPlan::Local { .. } => Procedure::Splits,
-        MapPlan::Neighbours { .. } => Procedure::Neighbours,
-        _ if plan.map.trained().is_some() => Procedure::Training,
-        _ => Procedure::ForwardRegression,
+        MapPlan::Local { .. } => MapsOutcome::split,
+        MapPlan::Neighbours { .. } => MapsOutcome::of_neighbours,
+        _ if plan.map.trained().is_some() => MapsOutcome::trained,
+        _ => MapsOutcome::chosen,
     };
     // Samples are no parameters: as many as there are of them for each that is asked stand for one.
     let parameters = fitted.iter().map(|one| {
@@ -108,19 +108,7 @@ pub(super) fn reported(
         criteria: Criteria::new(determinant, parameters, samples),
         condition,
     };
-    let report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions: Vec::new(),
-        model: Model::from(model.clone()),
-        estimation,
-        fit: Vec::new(),
-        purpose: String::new(),
-        warnings: Vec::new(),
-    };
+    let report = Report::new(data, model.clone(), estimation);
     Reported { report, model }
 }
 

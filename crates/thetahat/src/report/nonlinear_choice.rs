@@ -8,7 +8,7 @@ use thetahat_numerics::optimize::{Deadline, Monitor, Search};
 use super::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
 use crate::Error;
 use crate::data::{Log, Rows, Source};
-use crate::estimate::{MapsOutcome, Method, Procedure, RunFigures, TermStep};
+use crate::estimate::{MapsOutcome, Method, RunFigures, TermStep};
 use crate::model::Activation;
 use crate::report::shares::Shares;
 use crate::report::{Plan, Report, apply, identify_monitored};
@@ -196,7 +196,7 @@ fn best(
                 outcome.path.clone_from(&path);
                 outcome
             });
-            report.estimation.procedure = Procedure::Training(MapsOutcome { maps: maps.collect() });
+            report.estimation.procedure = MapsOutcome { maps: maps.collect() }.trained();
             report
         }
         None => {

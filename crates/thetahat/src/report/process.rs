@@ -13,13 +13,13 @@ use super::evaluate::evaluate;
 use super::plan::Plan;
 use super::schema::{Estimation, Report};
 use super::shares::Shares;
+use crate::Error;
 use crate::data::{Decision, FindingKind, Log, Offset, Rows, Source, Split};
-use crate::estimate::{Background, Criteria, Initial, Procedure, ProcessEstimate, least_free_run};
-use crate::model::{Model, OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
+use crate::estimate::{Background, Criteria, Initial, ProcessEstimate, least_free_run};
+use crate::model::{OffsetCovariance, Parameter, ProcessModel, ProcessStructure, Quantity, Signal};
 use crate::respond::process::{ProcessOnLog, held_logs};
 use crate::select::Focus;
 use crate::validate::Part;
-use crate::{Document, Error};
 
 /// What process to fit, and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -281,21 +281,11 @@ pub fn fit_process(
         mse: found.mse,
         criteria: Criteria::new(found.mse, count + background.offsets(), found.samples),
         condition: found.condition,
-        procedure: Procedure::FreeRun(found.outcome),
+        procedure: found.outcome.of_log(),
     };
-    let mut report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions,
-        warnings: warnings::of_fit(&model, &held, &estimation, starts),
-        model: Model::from(model.clone()),
-        estimation,
-        fit: Vec::new(),
-        purpose: String::new(),
-    };
+    let words = warnings::of_fit(&model, &held, &estimation, starts);
+    let mut report = Report { decisions, ..Report::new(data, model.clone(), estimation) };
+    report.warnings.extend(words);
     if log.check_uniform().is_ok()
         && let Ok(record) = deviations.record(&plan.inputs, &plan.output, &report.data.estimation)
     {

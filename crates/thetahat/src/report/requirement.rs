@@ -231,17 +231,14 @@ impl Demand {
 
     fn check(&self, report: &Report) -> Result<(), Error> {
         let refused = |message: &str| Err(Error::argument("require", message));
-        let kind = if report.estimation.procedure.is_instrumental() {
-            Some("fitted by instrumental variables")
-        } else if report.model.describes_noise() {
-            None
+        let silent = if report.estimation.procedure.is_instrumental() {
+            Some("a model fitted by instrumental variables".to_owned())
         } else {
-            Some(if report.model.as_process().is_some() { "of a process" } else { "of output error" })
+            (!report.model.describes_noise()).then(|| report.model.name())
         };
-        match (self, kind) {
-            (Self::White, Some(kind)) => refused(&format!(
-                "white: a model {kind} says nothing of the noise, and its residuals need not be white; ask for \
-                 independent"
+        match (self, silent) {
+            (Self::White, Some(model)) => refused(&format!(
+                "white: {model} says nothing of the noise, and its residuals need not be white; ask for independent"
             )),
             (Self::Independent, _) if !report.model.is_driven() => {
                 refused("independent: the model has no inputs; ask for white")

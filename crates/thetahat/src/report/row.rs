@@ -104,18 +104,16 @@ fn fits(row: &mut Row, fits: &[Fit], several: bool) {
 
 /// Whether a model is stable, its static gains and its longest time constant.
 fn dynamics(row: &mut Row, model: &Model) {
-    let (Some(stable), Some(constants), Some(gains)) =
-        (model.stability(), model.time_constants(), model.static_gains())
-    else {
-        return;
-    };
-    row.add("stable", crate::Cell::Flag(stable));
-    for (gains, output) in gains.into_iter().zip(model.outputs()) {
+    if let Some(stable) = model.stability() {
+        row.add("stable", crate::Cell::Flag(stable));
+    }
+    for (gains, output) in model.static_gains().unwrap_or_default().into_iter().zip(model.outputs()) {
         for (gain, input) in gains.iter().zip(model.inputs()) {
             let name = of("dc_gain", model.inputs().len() > 1, &input.name);
             quantity(row, &of(&name, model.outputs().len() > 1, &output.name), gain.as_ref());
         }
     }
+    let constants = model.time_constants().unwrap_or_default();
     let longest = constants.iter().flatten().max_by(|one, other| one.value.total_cmp(&other.value));
     quantity(row, "time_constant", longest);
 }

@@ -3,8 +3,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::warnings::overlapping_rows;
 use crate::data::{Decision, Prefilter, Rows, Source};
-use crate::document::document_methods;
+use crate::document::{GENERATOR, document_methods};
 use crate::estimate::{Criteria, Initial, Procedure};
 use crate::model::{Model, Quantity};
 use crate::plan::FitOptions;
@@ -128,6 +129,25 @@ pub struct Estimation {
     /// The condition number of the regressors, scaled to unit norm; for a search that of psi. None where they are
     /// dependent.
     pub condition: Option<f64>,
+}
+
+impl Report {
+    /// A report without figures and purpose, with what there is to warn of in the rows.
+    pub(super) fn new(data: Data, model: impl Into<Model>, estimation: Estimation) -> Self {
+        Self {
+            schema: Self::SCHEMA.to_owned(),
+            generator: GENERATOR.to_owned(),
+            plan: None,
+            warnings: overlapping_rows(&data).into_iter().collect(),
+            data,
+            selection: None,
+            decisions: Vec::new(),
+            model: model.into(),
+            estimation,
+            fit: Vec::new(),
+            purpose: String::new(),
+        }
+    }
 }
 
 impl Data {

@@ -13,10 +13,10 @@ use thetahat_numerics::regression::{SAFE_NORMS, largest};
 use super::pending::{Open, PendingEvaluation};
 use super::schema::{Data, Estimation, Report};
 use super::shares::Shares;
+use crate::Error;
 use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
-use crate::model::{Model, Quantity, Signal, StateSpaceModel};
-use crate::{Document, Error};
+use crate::model::{Quantity, Signal, StateSpaceModel};
 pub(super) use estimated::{Estimated, by_sums, of_arx};
 
 /// Which state-space model to fit, and to which part of a log.
@@ -357,19 +357,9 @@ pub(super) fn reported(
         criteria: Criteria::new(mean.determinant(), free, samples),
         condition: None,
     };
-    let report = Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions: Vec::new(),
-        warnings: warnings::of_fit(&model, &estimation, &offered),
-        model: Model::from(model.clone()),
-        estimation,
-        fit: Vec::new(),
-        purpose: String::new(),
-    };
+    let words = warnings::of_fit(&model, &estimation, &offered);
+    let mut report = Report::new(data, model.clone(), estimation);
+    report.warnings.extend(words);
     Ok((report, model))
 }
 

@@ -15,6 +15,7 @@ use super::evaluate::of_output;
 use super::fitted_rows::rows_of_fit;
 use super::suited::{check_offsets, check_sample_time};
 use crate::data::{Detrend, Log, Offset, Rows, Source, checked};
+use crate::document::GENERATOR;
 use crate::estimate::{Criteria, NullDistribution};
 use crate::figures::{chance, fixed, number};
 use crate::model::Model;
@@ -23,7 +24,6 @@ use crate::spectrum::MeasuredResponse;
 use crate::validate::{Fit, Residuals, nonlinearities, portmanteau};
 use crate::{Document, Error};
 
-const GENERATOR: &str = concat!("thetahat ", env!("CARGO_PKG_VERSION"));
 /// The levels of the prediction intervals of which the coverage is counted.
 const LEVELS: [f64; 4] = [0.5, 0.8, 0.95, 0.99];
 /// Fits whose samples differ by more than this fraction have no comparable criteria.
@@ -147,7 +147,7 @@ impl ValidationPlan {
     pub fn check(&self) -> Result<(), Error> {
         for &steps in &self.horizons {
             if steps == 0 {
-                return Err(Error::argument("horizon", "a prediction looks at least one step ahead"));
+                return Err(Error::argument("horizon", "0: give a number of steps from 1 on"));
             }
             check_steps("horizon", steps)?;
         }

@@ -10,6 +10,7 @@ use super::response::{BandQuality, MeasuredResponse, NoisePoint};
 use super::signals::Signals;
 use super::{etfe, lpm, sines, spa, welch};
 use crate::data::{Log, Rows, Source};
+use crate::document::GENERATOR;
 use crate::figures::{fixed, short};
 use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::validate::feedback::feedback;
@@ -145,7 +146,7 @@ fn document(
     words.extend(following(signals, plan));
     Ok(MeasuredResponse {
         schema: MeasuredResponse::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         logs: sources.to_vec(),
         rows: used.iter().map(|rows| Rows::new(rows.start + 1, rows.end)).collect::<Result<_, _>>()?,
         sample_time,

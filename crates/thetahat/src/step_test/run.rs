@@ -5,6 +5,7 @@ use super::evaluate::{Section, evaluated};
 use super::levels::{Jump, moves};
 use super::process::fitted;
 use crate::data::{Log, Rows, Source, checked};
+use crate::document::GENERATOR;
 use crate::figures::{error, short};
 use crate::inspect::quantization;
 use crate::model::Quantity;
@@ -132,7 +133,7 @@ pub fn step_test(log: &Log, sources: &[Source], plan: &StepTestPlan) -> Result<S
     warnings.extend(nonlinear(&steps));
     Ok(StepTest {
         schema: StepTest::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         logs: sources.to_vec(),
         input: plan.input.clone(),
         output: plan.output.clone(),

@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_PI_4;
 
 use super::document::{StepFigure, StepMethod, StepSummary, StepTest};
+use crate::document::GENERATOR;
 use crate::figures::{fixed, short};
 use crate::model::Quantity;
 use crate::respond::FrequencyPoint;
@@ -95,7 +96,7 @@ pub fn sine_test(found: &MeasuredResponse, input: &str) -> Result<StepTest, Erro
     }
     Ok(StepTest {
         schema: StepTest::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         logs: found.logs.clone(),
         input: input.to_owned(),
         output: found.output.clone(),

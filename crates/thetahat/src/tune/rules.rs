@@ -3,6 +3,7 @@
 use super::closed_loop::closed_loop;
 use super::document::{Controller, ControllerSettings, ReducedProcess, Rule, Tuning};
 use super::lags::{Lags, lags};
+use crate::document::GENERATOR;
 use crate::figures::short;
 use crate::model::{ProcessModel, ProcessStructure};
 use crate::{Document, Error};
@@ -110,7 +111,7 @@ pub fn tune(model: &ProcessModel, plan: &TuningPlan) -> Result<Tuning, Error> {
     let warnings = warnings(model, place, &process, &settings, plan);
     Ok(Tuning {
         schema: Tuning::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
+        generator: GENERATOR.to_owned(),
         model: format!("process {structure}"),
         input,
         output: model.output.name.clone(),

@@ -124,7 +124,7 @@ class ReportedModel:
                 "process": "a process",
                 "state-space": "in state space",
                 "continuous-state-space": "in continuous time",
-            }[self.kind]
+            }.get(self.kind, self.name)
             raise AttributeError(
                 f"{name} is of polynomial models, and this one is {kind}: it predicts, simulates, validates and compares"
             )

@@ -14,7 +14,7 @@ use super::{NormalEquations, Piece, Settings, Totals};
 use crate::Error;
 use crate::data::Offset;
 use crate::estimate::nonlinear_arx::{Candidates, Count, Joint, of_sums};
-use crate::estimate::{MapsOutcome, Procedure, out_of_range};
+use crate::estimate::{MapsOutcome, out_of_range};
 use crate::model::{ChannelExpression, Map, NonlinearArxModel, Signal};
 use crate::respond::InitialCondition;
 use crate::select::Select;
@@ -224,7 +224,7 @@ pub(super) fn solve(sums: &NormalEquations, centred: &Centred) -> Result<Report,
     let (solved, outcome) = of_sums(&model, choice, &products.monomials, &about)?;
     let (samples, mse, parameters) = (about.rows(), solved.mse, solved.model.parameters.len());
     let joint = Joint { model: solved.model, mse, determinant: mse, condition: solved.condition };
-    let procedure = Procedure::ForwardRegression(MapsOutcome { maps: vec![outcome] });
+    let procedure = MapsOutcome { maps: vec![outcome] }.chosen();
     let Reported { mut report, model } = reported(joint, procedure, (parameters, samples), sums.data());
     let spread = about.spread(DividedMonomials::TARGET).sqrt();
     report.fit.push(sums.one_step(&plan.outputs[0], (samples, mse), spread, InitialCondition::Drop));

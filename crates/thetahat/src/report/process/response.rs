@@ -3,14 +3,14 @@
 use thetahat_numerics::optimize::Monitor;
 
 use super::{ProcessPlan, model};
+use crate::Error;
 use crate::data::Offset;
-use crate::estimate::{Criteria, Procedure, ResponsePoints, least_response_errors};
-use crate::model::{Model, ProcessModel, Signal};
+use crate::estimate::{Criteria, ResponsePoints, least_response_errors};
+use crate::model::{ProcessModel, Signal};
 use crate::report::Report;
 use crate::report::schema::{Data, Estimation, Missing};
 use crate::respond::FrequencyResponse;
 use crate::spectrum::MeasuredResponse;
-use crate::{Document, Error};
 
 /// Finds the process whose frequency response, with an input that is held from sample to sample, comes closest to a
 /// measured one:
@@ -128,7 +128,7 @@ pub fn fit_process_to_response(
         mse: found.mse,
         criteria: Criteria::new(found.mse, names.len(), found.samples),
         condition: found.condition,
-        procedure: Procedure::FrequencyResponse(found.outcome),
+        procedure: found.outcome.of_response(),
     };
     let mut warnings = super::warnings::of_parameters(&own, f64::INFINITY);
     if response.bands.honest == Some(false) {
@@ -141,19 +141,7 @@ pub fn fit_process_to_response(
             crate::figures::short((10.0 * found.mse.sqrt()).round() / 10.0)
         ));
     }
-    Ok(Report {
-        schema: Report::SCHEMA.to_owned(),
-        generator: concat!("thetahat ", env!("CARGO_PKG_VERSION")).to_owned(),
-        plan: None,
-        data,
-        selection: None,
-        decisions: Vec::new(),
-        model: Model::from(own),
-        estimation,
-        fit: Vec::new(),
-        purpose: String::new(),
-        warnings,
-    })
+    Ok(Report { warnings, ..Report::new(data, own, estimation) })
 }
 
 /// Mean squares above this, in variances of the points, are worth a warning.

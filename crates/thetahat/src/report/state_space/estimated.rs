@@ -114,7 +114,7 @@ pub(in crate::report) fn of_arx(
         levels: found.levels,
         has_levels: found.outcome.constant,
         covariance: found.covariance,
-        procedure: Procedure::VectorArx(found.outcome),
+        procedure: Procedure::from(found.outcome),
         free: found.free_parameters,
         degrees,
         samples,
@@ -208,7 +208,7 @@ fn of_order(
         levels,
         has_levels: found.has_constant(),
         covariance,
-        procedure: Procedure::Subspace(SubspaceOutcome {
+        procedure: Procedure::from(SubspaceOutcome {
             weighting: found.weighting(),
             past: found.past(),
             future: found.future(),

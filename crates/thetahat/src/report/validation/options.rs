@@ -4,7 +4,6 @@ use super::ValidationPlan;
 use crate::Error;
 use crate::data::{Detrend, Rows};
 use crate::options::{OptionText, options};
-use crate::report::Requirement;
 
 const LOG: &str = "";
 const TESTS: &str = "Tests";
@@ -43,7 +42,7 @@ options! {
     /// use thetahat::report::{ValidationOptions, ValidationPlan};
     ///
     /// let options: ValidationOptions = serde_json::from_str(r#"{"horizon": [1, 10], "detrend": "mean"}"#)?;
-    /// let plan = ValidationPlan::of(&options, &["fit@20>=50".parse()?])?;
+    /// let plan = ValidationPlan::of(&options, &[20])?;
     /// assert_eq!(plan.horizons, [1, 10, 20]);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -64,14 +63,16 @@ options! {
 }
 
 impl ValidationPlan {
-    /// What options ask for, and what is required, which is evaluated too.
+    /// What options ask for, and horizons that something else asks for, such as a [`Requirement`].
+    ///
+    /// [`Requirement`]: crate::report::Requirement
     ///
     /// # Errors
     /// As for [`check`](Self::check).
-    pub fn of(options: &ValidationOptions, required: &[Requirement]) -> Result<Self, Error> {
+    pub fn of(options: &ValidationOptions, further: &[usize]) -> Result<Self, Error> {
         let usual = Self::default();
         let mut horizons = if options.horizon.is_empty() { usual.horizons } else { options.horizon.clone() };
-        horizons.extend(required.iter().filter_map(Requirement::steps));
+        horizons.extend(further);
         let plan = Self {
             rows: options.rows.clone(),
             detrend: match options.detrend {

@@ -250,7 +250,7 @@ fn requirements_are_read_and_refused() {
     let log = log(&u, &y);
     let oe = fitted(&log, "1..300", Orders::oe(&[2], &[2], &[1]).unwrap(), Initial::Auto);
     let text = Requirement::from(Demand::White).check(&oe).unwrap_err().to_string();
-    assert!(text.contains("of output error") && text.contains("ask for independent"), "{text}");
+    assert!(text.contains("OE(") && text.contains("says nothing of the noise"), "{text}");
     assert!(Requirement::from(Demand::Independent).check(&oe).is_ok());
     assert!(!found(&oe, &log, &plan("")).white_expected);
     let ar = fitted(&log, "1..300", Orders::arx(2, &[], &[]).unwrap(), Initial::Auto);

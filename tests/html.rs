@@ -328,8 +328,8 @@ fn modelled(orders: Orders) -> (Report, Validated) {
 }
 
 fn polynomials(report: &mut Report) -> &mut PolynomialModel {
-    let Model::Polynomial(model) = &mut report.model else { panic!("the case is one of polynomials") };
-    model
+    let own = if let Model::Polynomial(model) = &mut report.model { Some(model) } else { None };
+    own.expect("the case is sound")
 }
 
 fn inspected() -> Inspection {

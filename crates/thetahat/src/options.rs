@@ -1,6 +1,6 @@
 //! Options as data: tables of what they are called, what they do, and what they may be.
 //!
-//! [`options!`] makes a struct of a table: the options that were given. It is written to JSON and read back. An option
+//! A struct of a table holds the options that were given. It is written to JSON and read back. An option
 //! has one of five [`Form`]s, its values are texts, numbers or words. A command line, its help, the types and the
 //! documentation of Python, JSON Schemas and refusals are made of the table.
 

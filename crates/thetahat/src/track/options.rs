@@ -129,7 +129,7 @@ options! {
         /// selective:FACTOR, random-walk:VARIANCE, variable:FACTOR:MINIMUM:NOISE_VARIANCE
         forgetting: Vec<Policy>, "HOW[,HOW…]", "exponential:0.99", ADAPTATION;
         /// How to start: standard (from a wide prior), exact (without prior, once the samples determine the parameters),
-        /// or mixed[:SAMPLES] (standard, then blended into exact)
+        /// or mixed, mixed:SAMPLES (standard, then blended into exact)
         start: Option<TrackStart>, "HOW", "standard", ADAPTATION;
         /// Do not adapt where the innovation is smaller than this, in units of the output
         dead_zone: Option<f64>, "WIDTH", "0", ADAPTATION;

@@ -4,6 +4,7 @@ use thetahat_numerics::noise::Noise;
 use thetahat_numerics::optimize::Search;
 
 use super::*;
+use crate::Document;
 use crate::data::Record;
 use crate::estimate::{ConvexFit, estimate};
 use crate::model::{Model, PolynomialModel};

@@ -6,6 +6,7 @@ mod outputs_and_expressions;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
+use crate::Document;
 use crate::data::Detrend;
 use crate::estimate::Constant;
 use crate::model::Orders;

@@ -3,6 +3,7 @@ use std::ops::ControlFlow;
 use thetahat_numerics::noise::Noise;
 
 use super::*;
+use crate::Document;
 use crate::respond::process::run;
 use crate::respond::{Horizon, InitialCondition};
 use crate::tests::{assert_refused, channel};

@@ -1,8 +1,10 @@
 use thetahat_numerics::noise::Noise;
 
 use super::*;
+use crate::Document;
 use crate::data::Channel;
 use crate::estimate::Procedure;
+use crate::model::Model;
 use crate::report::{Requirement, ValidationPlan, validate};
 use crate::respond::Horizon;
 use crate::tests::{assert_refused, channel};

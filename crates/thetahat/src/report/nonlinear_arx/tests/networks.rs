@@ -3,6 +3,7 @@
 use thetahat_numerics::random::Random;
 
 use super::*;
+use crate::Document;
 use crate::model::Activation;
 use crate::report::fit_nonlinear_arx_monitored;
 use crate::respond::nonlinear_arx::NonlinearArxOnLog;

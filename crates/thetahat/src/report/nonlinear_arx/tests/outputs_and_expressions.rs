@@ -1,6 +1,7 @@
 //! Several outputs, expressions of channels, and runs that are kept within a range.
 
 use super::*;
+use crate::Document;
 use crate::report::apply;
 
 /// Two outputs that act on one another,

@@ -468,8 +468,8 @@ fn trackers_take_functions() {
 
     for (options, words) in [
         ("--narx rbf", "possible values: poly"),
-        ("--narx poly --na 2", "cannot be used with"),
-        ("--narx poly --constant", "cannot be used with"),
+        ("--narx poly --na 2", "--na: does not work with --narx"),
+        ("--narx poly --constant", "--constant: does not work with --narx"),
         ("--narx poly --ny 9 --nu 9 --degree 6", "--degree"),
         ("--narx poly --degree 0", "--degree"),
         ("--narx poly --ny 0 --nu 0", "orders"),

@@ -1,71 +1,9 @@
-//! How an estimate was found, and what follows from it for those who use it.
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use thetahat_numerics::optimize::Stopped;
-use thetahat_numerics::regression::Solver;
+//! What follows from how an estimate was found, for those who use it.
 
 use super::{
-    ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, ProcessOutcome, RegularisedOutcome,
-    RobustOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
+    ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, Procedure, ProcessOutcome,
+    RegularisedOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
 };
-
-/// How an estimate was found.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "method", rename_all = "kebab-case")]
-pub enum Procedure {
-    /// In one step, as the predictor is linear in the parameters.
-    LeastSquares {
-        /// How the least-squares problem was solved.
-        solver: Solver,
-    },
-    /// By instrumental variables in four stages: A and B, whatever the colour of the noise.
-    InstrumentalVariables {
-        /// The order of the autoregression that the signals of the last stage are filtered by.
-        filter_order: usize,
-        /// The order of the autoregression of the residuals that the covariance rests on.
-        residual_order: usize,
-    },
-    /// By refined instrumental variables: B and F, whatever the colour of the noise.
-    RefinedInstrumentalVariables {
-        /// Iterations done, from the best start.
-        iterations: usize,
-        /// Why they stopped.
-        stopped: Stopped,
-        /// The initial conditions that were estimated.
-        initial_conditions: usize,
-        /// The order of the autoregression of the residuals that the covariance rests on.
-        residual_order: usize,
-    },
-    /// By a search for the least sum of squared prediction errors.
-    PredictionError(SearchOutcome),
-    /// By regularised least squares, with the kernel of the largest marginal likelihood.
-    Regularised(RegularisedOutcome),
-    /// By convex optimization.
-    Constrained(ConvexOutcome),
-    /// By a search for the least sum of a loss that does not follow wild samples.
-    Robust(RobustOutcome),
-    /// By a search for the largest likelihood of all measured outputs.
-    ExactLikelihood(LikelihoodOutcome),
-    /// The largest likelihood of the innovations of a model in equations.
-    InnovationsLikelihood(EquationsOutcome),
-    /// In one step for functions of the regressors, which were chosen one after the other.
-    ForwardRegression(MapsOutcome),
-    /// In one step for local models, whose boxes were split one after the other.
-    Splits(MapsOutcome),
-    /// By the samples themselves.
-    Neighbours(MapsOutcome),
-    /// By a search for all numbers of a map, from several starts.
-    Training(MapsOutcome),
-    /// By a search for the least errors of the free run of a process in continuous time.
-    FreeRun(ProcessOutcome),
-    /// By a search for the least errors of the frequency response of a process.
-    FrequencyResponse(ProcessOutcome),
-    /// By a subspace method: the states first, then the matrices.
-    Subspace(SubspaceOutcome),
-    /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
-    VectorArx(VectorArxOutcome),
-}
 
 /// Which distribution the tests of residuals have where the model is right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,6 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::warnings::overlapping_rows;
 use crate::data::{Decision, Prefilter, Rows, Source};
 use crate::document::{GENERATOR, document_methods};
 use crate::estimate::{Criteria, Initial, Procedure};
@@ -138,7 +137,7 @@ impl Report {
             schema: Self::SCHEMA.to_owned(),
             generator: GENERATOR.to_owned(),
             plan: None,
-            warnings: overlapping_rows(&data).into_iter().collect(),
+            warnings: data.overlap().into_iter().collect(),
             data,
             selection: None,
             decisions: Vec::new(),
@@ -151,6 +150,13 @@ impl Report {
 }
 
 impl Data {
+    /// Warns of rows that the model was both fitted to and validated on.
+    pub(super) fn overlap(&self) -> Option<String> {
+        let overlaps = |v: &Rows, e: &Rows| v.first() <= e.last() && e.first() <= v.last();
+        let any = self.validation.iter().any(|v| self.estimation.iter().any(|e| overlaps(v, e)));
+        any.then(|| "validation rows overlap estimation rows: their figures flatter the model".to_owned())
+    }
+
     /// The rows that were held out of the fit, and what they served for.
     pub(crate) fn held_out(&self) -> Vec<(Part, Vec<Rows>)> {
         let test = self.split.as_ref().map_or_else(Vec::new, |parts| parts.test.clone());

@@ -3,8 +3,7 @@
 use thetahat_numerics::optimize::Stopped;
 
 use super::fitted_rows::is_exact;
-use super::schema::{Data, Report};
-use crate::data::Rows;
+use super::schema::Report;
 use crate::estimate::SearchOutcome;
 use crate::figures::{error, fixed, number, scientific};
 use crate::model::{Orders, PolynomialModel, Structure, cancel, near_cancellation};
@@ -41,7 +40,7 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
     if data.time_gaps > 0 {
         warnings.push(format!("gaps in the clock: {}; the log is cut there", data.time_gaps));
     }
-    warnings.extend(overlapping_rows(data));
+    warnings.extend(data.overlap());
     if !model.stable {
         let largest = model.poles.iter().map(|pole| pole.re.hypot(pole.im)).fold(0.0, f64::max);
         warnings.push(format!(
@@ -78,13 +77,6 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
         ));
     }
     warnings
-}
-
-/// Warns of rows that the model was both fitted to and validated on.
-pub(super) fn overlapping_rows(data: &Data) -> Option<String> {
-    let overlaps = |v: &Rows, e: &Rows| v.first() <= e.last() && e.first() <= v.last();
-    let any = data.validation.iter().any(|v| data.estimation.iter().any(|e| overlaps(v, e)));
-    any.then(|| "validation rows overlap estimation rows: their figures flatter the model".to_owned())
 }
 
 /// Warns of impulse responses whose last tap is not zero for certain.

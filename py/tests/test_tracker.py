@@ -357,7 +357,7 @@ def test_bad_trackers() -> None:
         ({"na": 1, "nb": 1, "inputs": ["y"]}, ValueError, "^inputs: 'y' is named twice"),
         ({"na": 1, "nb": 1, "inputs": [3]}, TypeError, "^inputs: expected a str"),
         ({"na": 1, "nb": 1, "constant": 1}, TypeError, "^constant: expected True or False"),
-        ({"na": 1, "nb": 1, "sample_time": 0.0}, ValueError, "^sample_time 0: not a positive number"),
+        ({"na": 1, "nb": 1, "sample_time": 0.0}, ValueError, "^sample_time: 0: not a positive number"),
         ({"warm": model, "na": 2}, ValueError, "^na: the orders are those of warm"),
         ({"warm": "model.json"}, TypeError, "^warm: expected a Model, found str"),
         ({"warm": model, "inputs": ["a", "b"]}, ValueError, "^inputs: expected 1 names as warm has inputs, found 2"),

@@ -56,6 +56,10 @@ impl Tracking {
         report: Option<&Report>,
     ) -> Result<Self, thetahat::Error> {
         options.check(report.is_some())?;
+        if let Some(seconds) = sample_time.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+            let message = format!("{seconds}: not a positive number of seconds; give one above 0");
+            return Err(thetahat::Error::argument("sample-time", message));
+        }
         let trackers = options.trackers(&inputs, &outputs, report)?;
         let channels = Channels { inputs, outputs };
         let (horizon, every, format) = (options.horizon, 1, Format::JsonLines);

@@ -32,8 +32,8 @@ const R: Kind = Kind::RESPONSE;
 options! {
     /// The options of a fit, as they were given: a plan.
     ///
-    /// It is written as a JSON object of those that were given. A reader takes numbers and texts, lists of them,
-    /// and objects where values have names.
+    /// It is written as a JSON object of those that were given. A reader takes numbers and texts, lists of them, and
+    /// objects where values have names.
     ///
     /// ```
     /// use thetahat::plan::FitOptions;
@@ -55,8 +55,8 @@ options! {
         estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E];
         /// Rows to validate on
         validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N E];
-        /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K rows);
-        /// what is left of the output's level and slope `constant` and `trend` estimate
+        /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K
+        /// rows); what is left of the output's level and slope `constant` and `trend` estimate
         detrend: Option<Detrend>, "WHAT", "mean", CHANNELS, [P I S V N];
         /// Set a channel's offset by hand
         offset: Vec<NamedValue>, "NAME=VALUE", "", CHANNELS, [P I S V C N];
@@ -85,12 +85,12 @@ options! {
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
         /// What is known of an impulse response before the data (`model` fir): that it decays and is smooth
         kernel: Option<KernelWord>, "KERNEL", "dc", MODEL, [I];
-        /// What a process in continuous time has (`model` process): p, how many lags, then d for a dead time, z a zero, i
-        /// an integrator, u two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct term, as
-        /// batteries have them. One for each input or one for all; the clock may be irregular
+        /// What a process in continuous time has (`model` process): p, how many lags, then d for a dead time, z a zero,
+        /// i an integrator, u two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct
+        /// term, as batteries have them. One for each input or one for all; the clock may be irregular
         structure: Vec<ProcessStructure>, "p1d|p2du|rc2|…[,…]", "", MODEL, [C R];
-        /// Poles of a transfer function in continuous time (`model` tf), 1 to 6; one number for each input or one for all;
-        /// the clock may be irregular
+        /// Poles of a transfer function in continuous time (`model` tf), 1 to 6; one number for each input or one for
+        /// all; the clock may be irregular
         np: Vec<usize>, "N[,…]", "", MODEL, [C R];
         /// Its zeros, no more than poles; one number for each input or one for all
         nz: Vec<usize>, "N[,…]", "one less than poles", MODEL, [C R];
@@ -98,14 +98,14 @@ options! {
         delay: bool, "", "", MODEL, [C R];
         /// How to estimate
         method: Option<MethodWord>, "METHOD", "pem", MODEL, [P I];
-        /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing outputs
-        /// (models without D and F)
+        /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing
+        /// outputs (models without D and F)
         likelihood: Option<LikelihoodWord>, "LIKELIHOOD", "conditional", MODEL, [P I];
         /// What stands before the first sample of a segment
         initial: Option<Initial>, "INITIAL", "auto", MODEL, [P I S V C];
-        /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone),
-        /// or a number of steps ahead. auto: prediction, unless without orders another model simulates rows held out from
-        /// it clearly better; of networks and rbf-free simulation where there are inputs
+        /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs
+        /// alone), or a number of steps ahead. auto: prediction, unless without orders another model simulates rows
+        /// held out from it clearly better; of networks and rbf-free simulation where there are inputs
         focus: Option<Focus>, "auto|prediction|simulation|K", "auto", MODEL, [P I S V N];
         /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and
         /// other logs of which the mean is not where the plant rests
@@ -120,11 +120,11 @@ options! {
         future: Option<usize>, "S", "as many as past ones", STATES, [S];
         /// Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future inputs
         weighting: Option<Weighting>, "METHOD", "ssarx", STATES, [S];
-        /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen that
-        /// feeds outputs back to the inputs
+        /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen
+        /// that feeds outputs back to the inputs
         feedthrough: Option<FeedthroughWord>, "FEEDTHROUGH", "auto", STATES, [S];
-        /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles, gains
-        /// and responses then have standard errors
+        /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles,
+        /// gains and responses then have standard errors
         refine: Option<Refine>, "prediction|simulation", "", STATES, [S];
         /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains
         /// most of what is left comes next, or with a network or radial basis functions that are trained
@@ -133,34 +133,34 @@ options! {
         ny: Vec<usize>, "N[,…]", "2; with auto also as the linear model that the data choose", NARX, [N];
         /// Values of each input that g reads, from `nk` on: u(k-nk), …; one number for each input or one for all
         nu: Vec<usize>, "N[,…]", "2", NARX, [N];
-        /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once for
-        /// each
+        /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once
+        /// for each
         regressor: Vec<String>, "EXPRESSION", "", NARX, [N];
         /// Factors of a product at most (poly)
         degree: Option<usize>, "D", "2", NARX, [N];
         /// How many functions to take
         terms: Option<usize>, "N",
             "as `select` says, by the free run on validation rows, or on blocks of the estimation rows", NARX, [N];
-        /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it they
-        /// are chosen
+        /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it
+        /// they are chosen
         term: Vec<String>, "PRODUCT", "", NARX, [N];
         /// How many functions to look at
         most_terms: Option<usize>, "N", "40, and 10 local models", NARX, [N];
-        /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of N
-        /// in each direction, or at N pseudo-random points
+        /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of
+        /// N in each direction, or at N pseudo-random points
         centres: Option<String>, "chosen|kmeans:N|grid:N|random:N", "chosen", NARX, [N];
         /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations
         width: Option<f64>, "SIGMA", "so that neighbours overlap", NARX, [N];
-        /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place of
-        /// planes (local), or means (knn)
+        /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place
+        /// of planes (local), or means (knn)
         no_linear: bool, "", "", NARX, [N];
         /// How local models share the space of the regressors (local)
         membership: Option<Membership>, "SHAPE", "gaussian", NARX, [N];
-        /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn); bends
-        /// of each regressor (spline), 5 if not said; units that are drawn (step, `drawn`), 100 if not said
+        /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn);
+        /// bends of each regressor (spline), 5 if not said; units that are drawn (step, `drawn`), 100 if not said
         units: Option<usize>, "N", "chosen", NARX, [N];
-        /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else they
-        /// are trained. Those of step are always drawn
+        /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else
+        /// they are trained. Those of step are always drawn
         drawn: bool, "", "", NARX, [N];
         /// Leave signals in their own units: else each is divided by its standard deviation
         raw_terms: bool, "", "", NARX, [N];
@@ -185,9 +185,9 @@ options! {
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
         /// After so long begin no iteration, and look for no further start
         time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R];
-        /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule;
-        /// huber or huber:K, of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if
-        /// not said); inf, the largest error
+        /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber
+        /// or huber:K, of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not
+        /// said); inf, the largest error
         norm: Option<NormOption>, "2|1|huber[:K]|inf", "2", CRITERION, [P I];
         /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
         bound: Vec<Bound>, "NAME=LOW..HIGH", "", CRITERION, [P I];

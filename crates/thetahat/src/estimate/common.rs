@@ -7,7 +7,7 @@ use thetahat_numerics::optimize::{Deadline, Monitor, Search, best_free, search};
 use super::prediction_error::is_determined;
 use super::predictor::{InitialCondition, Predictor};
 use super::start::candidates;
-use super::stretches::energy;
+use super::thinning::energy;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;

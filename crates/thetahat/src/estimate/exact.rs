@@ -44,7 +44,7 @@ use super::arx::{out_of_range, rows, signals};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Polynomials;
 use super::prediction_error::{ON_CIRCLE, flat, prediction_error, told};
-use super::stretches::{energy, filled};
+use super::thinning::{energy, filled};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::{Record, measured};

@@ -37,7 +37,7 @@ use super::criterion::{ConvexFit, ConvexOutcome, Norm};
 use super::outcome::ProgramsOutcome;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::predictor::Predictor;
-use super::stretches::energy;
+use super::thinning::energy;
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;

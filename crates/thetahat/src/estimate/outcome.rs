@@ -45,8 +45,8 @@ pub struct SearchOutcome {
     pub unstable_steps: usize,
     /// The initial conditions that were estimated.
     pub initial_conditions: usize,
-    /// How many samples, in stretches spread over the log, the starts were compared and searched on before the search
-    /// on all of them; none if these were all.
+    /// The number of samples, in segments spread over the log, on which the starts were compared and searched from,
+    /// before the search on all samples; none if all samples were used from the start.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_samples: Option<usize>,
     /// The start that won.

@@ -134,8 +134,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// The best start for the search on the whole record.
     ///
-    /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a
-    /// few iterations on all samples are left.
+    /// For a long record the starts are compared and searched from on segments that are spread over it: their minimum is
+    /// close to that of all samples, which then takes a few iterations.
     fn beginning<D: ExperimentData>(
         &self,
         data: &D,

@@ -513,7 +513,7 @@ impl<'a> Predictor<'a> {
         }
     }
 
-    /// The errors that count, and the segments of them that follow one another.
+    /// The residuals that count, and the ranges of consecutive samples among them.
     pub(super) fn residuals(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut residuals = Vec::with_capacity(self.samples);
         let runs =
@@ -527,8 +527,9 @@ impl<'a> Predictor<'a> {
         (residuals, segments)
     }
 
-    /// The errors from the first to the last that counts in each section, NaN where an output is missing between them.
-    pub(super) fn stretches(&self) -> (Vec<f64>, Vec<Range<usize>>) {
+    /// The residuals of each section, from the first that counts to the last: NaN where an output between them is
+    /// missing.
+    pub(super) fn residuals_by_section(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut errors = Vec::with_capacity(self.samples);
         let each = self.sections.iter().map(|section| {
             let (rows, first) = (section.span(), errors.len());

@@ -19,7 +19,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::optimize::normal;
 
 use super::refinement::RefinementOutcome;
-use super::stretches::thinned_joint;
+use super::thinning::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable, riccati};
@@ -480,8 +480,8 @@ impl Subspace {
     ///
     /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a
     /// canonical form, Ljung, System Identification, 2nd ed. 1999, section 4A). Of what the last states still leave of
-    /// noise-free outputs, 1e-8 of their root mean squares is nothing. Records of 2^18 samples and more are looked at
-    /// in eight stretches of 2^14. O(N (n + l) (n + m + l)) for each order.
+    /// noise-free outputs, 1e-8 of their root mean squares is nothing. Of records of 2^18 samples and more
+    /// eight segments of 2^14 are used. O(N (n + l) (n + m + l)) for each order.
     ///
     /// # Errors
     /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is
@@ -500,14 +500,14 @@ impl Subspace {
             )));
         }
         let thinned = thinned_joint(record);
-        let looked_at = thinned.as_ref().unwrap_or(record);
+        let used = thinned.as_ref().unwrap_or(record);
         self.scored(record.samples(0) as f64, orders, |_, model, levels| {
-            let mut products = innovations::products(model, looked_at, levels)?;
+            let mut products = innovations::products(model, used, levels)?;
             for (output, scale) in self.scales[m..].iter().enumerate() {
                 products.row_mut(output).unscale_mut(*scale);
                 products.column_mut(output).unscale_mut(*scale);
             }
-            Some(products / looked_at.samples(0) as f64)
+            Some(products / used.samples(0) as f64)
         })
     }
 

@@ -13,7 +13,7 @@ use super::ranking::ranked;
 use super::{Automatic, Delay, EXACT, Focus, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::data::{Decision, FindingKind, Record};
-use crate::estimate::{Initial, pays, stretches};
+use crate::estimate::{Initial, pays, thinned_to};
 use crate::model::{Orders, Structure};
 use crate::validate::feedback::{Loop, feedback};
 
@@ -139,7 +139,7 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
 
 /// What tells of a loop.
 fn loops(task: &Task<'_>) -> Loop {
-    let few = stretches(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
+    let few = thinned_to(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
     let record = few.as_ref().unwrap_or(task.estimation);
     feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments)
 }

@@ -21,7 +21,7 @@ use super::super::polynomials::Unusable;
 use super::super::prediction_error::{TWIN, flat, prediction_error, root_of};
 use super::super::predictor::{InitialCondition, Predictor};
 use super::super::reflection;
-use super::super::stretches::{energy, filled};
+use super::super::thinning::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
 use crate::Error;
@@ -358,7 +358,7 @@ fn finish(
         root_of(&LeastSquares::from_factor(&triangle, &zeros, 0.0, samples).ok()?)
     });
     let Some((root, condition)) = root else { return Err(flat(orders, &found.parameters)) };
-    let (residuals, segments) = predictor.stretches();
+    let (residuals, segments) = predictor.residuals_by_section();
     let sensitivities = || {
         let all = predictor.sensitivities();
         let mut own = vec![vec![0.0; residuals.len()]; shared.right.len()];

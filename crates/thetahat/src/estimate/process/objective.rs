@@ -535,8 +535,9 @@ impl<'a> ProcessObjective<'a> {
         1.0 - sum_of_squares(&left) / sum_of_squares(&self.residuals)
     }
 
-    /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero;
-    /// the columns of each stretch, and where it stands among the residuals.
+    /// The residuals and the columns `used` on all rows of each segment that counts; where no output was measured the
+    /// residual is NaN and the columns are zero. Gives the residuals, the columns of each segment, and the range of each
+    /// segment among the residuals.
     #[expect(clippy::type_complexity, reason = "three lists of one thing each")]
     pub(super) fn by_segments(
         &self,

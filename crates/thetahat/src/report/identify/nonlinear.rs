@@ -11,7 +11,7 @@ use thetahat_numerics::optimize::{Monitor, Search};
 
 use crate::Error;
 use crate::data::{Channel, Decision, FindingKind, Log, Record, Rows, Source, measured};
-use crate::estimate::stretches;
+use crate::estimate::thinned_to;
 use crate::figures::fixed;
 use crate::model::{Activation, Model, Orders};
 use crate::report::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
@@ -218,7 +218,7 @@ impl<'l> Nonlinear<'l> {
         let fit = |training: &Record<'_>| {
             let few = match plan.map {
                 MapPlan::Network { .. } if samples(training) > TRAINED => {
-                    stretches(training, PIECES, TRAINED / PIECES)
+                    thinned_to(training, PIECES, TRAINED / PIECES)
                 }
                 _ => None,
             };

@@ -92,7 +92,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             let weight = if resting { policy.factor() } else { lambda };
             if !resting {
                 // An outlier corrects by less, and P shrinks as by a sample with so much more noise.
-                let outlier = (nis > outliers.limit && running).then(|| outliers.judge(nis));
+                let outlier = (nis > outliers.limit && running).then(|| outliers.evaluate(nis));
                 let (noisy, growth) = match &outlier {
                     None => (noise, growth),
                     Some(outlier) => (noise * outlier.noise, outlier.growth(growth)),

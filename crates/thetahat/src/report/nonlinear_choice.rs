@@ -38,7 +38,7 @@ struct Tried {
     step: TermStep,
 }
 
-/// What models are fitted to and judged on in the choice.
+/// What models are fitted to and evaluated on in the choice.
 struct Parts<'l> {
     log: &'l Log,
     sources: &'l [Source],
@@ -290,7 +290,7 @@ impl Parts<'_> {
             Ok(report) => {
                 let term = format!("linear: {}", report.model.name());
                 let parameters = report.model.parameters().len();
-                Ok(self.judged(None, report, (term, parameters), InitialCondition::Estimate))
+                Ok(self.evaluated(None, report, (term, parameters), InitialCondition::Estimate))
             }
             Err(Error::Undetermined { .. }) => Ok(None),
             Err(error) => Err(error),
@@ -320,11 +320,11 @@ impl Parts<'_> {
             _ => last.term.clone(),
         };
         let row = (format!("{what}, of {} lags", model.regressors.len()), last.parameters);
-        Ok(self.judged(Some(plan), report, row, InitialCondition::Drop))
+        Ok(self.evaluated(Some(plan), report, row, InitialCondition::Drop))
     }
 
     /// What the runs of a model over the rows say of it; none where it has none.
-    fn judged(
+    fn evaluated(
         &self,
         plan: Option<NonlinearArxPlan>,
         report: Report,

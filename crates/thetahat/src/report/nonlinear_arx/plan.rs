@@ -157,7 +157,7 @@ pub struct NonlinearArxPlan {
     /// Rows to validate on.
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is
-    /// fitted again to the first two, and judged on the third. None: where trained models are compared, and no rows are
+    /// fitted again to the first two, and evaluated on the third. None: where trained models are compared, and no rows are
     /// to validate on, 70/30/0.
     pub split: Option<Split>,
     /// What is taken from each channel.

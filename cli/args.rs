@@ -133,7 +133,7 @@ Examples:
   thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv
   thetahat simulate model.json log.csv --draws 1000 --seed 1 > bands.csv")]
     Simulate(SimulateArguments),
-    /// Say how a fitted model does on a log, and whether anything is left in its residuals
+    /// Validate a model on a log and test its residuals
     ///
     /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
     /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a warning of feedback;

@@ -7,8 +7,8 @@ use clap::Args;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Many logs")]
 pub(crate) struct EachArguments {
-    /// Take each LOG by itself, on all cores: --table gets a row for each, and a log with which it cannot be done is a
-    /// row that says why. LOG may be a pattern between quotes, such as 'logs/*.csv' or 'logs/**/*.csv'
+    /// Take each LOG by itself, on all cores: --table gets a row for each, and a log that fails gets a row with the
+    /// reason. LOG may be a pattern between quotes, such as 'logs/*.csv' or 'logs/**/*.csv'
     #[arg(long, requires = "table")]
     pub(crate) each: bool,
     /// Take the logs or patterns that a file names too, one a line (- for standard input)

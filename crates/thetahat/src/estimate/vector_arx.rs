@@ -80,7 +80,7 @@ pub struct VectorArxOptions {
     pub na: RangeInclusive<usize>,
     /// How many past samples of the inputs: a range for all of them, or a number for each.
     pub nb: VectorArxInputs,
-    /// Which past outputs an output depends on; none: the data say it.
+    /// Which past outputs an output depends on; none: decided from the data.
     pub coupling: Option<Coupling>,
     /// By how many samples more all inputs are late, among these.
     pub delay: RangeInclusive<usize>,
@@ -95,9 +95,9 @@ pub struct VectorArxOptions {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VectorArxInputs {
-    /// As many of each, among these.
+    /// The same number for all inputs, chosen from this range.
     Alike(RangeInclusive<usize>),
-    /// So many of each.
+    /// A number for each input.
     Each(Vec<usize>),
 }
 

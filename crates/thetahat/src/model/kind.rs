@@ -136,7 +136,7 @@ impl Model {
         }
     }
 
-    /// How many numbers of it the data say.
+    /// The number of free parameters.
     pub fn free_parameters(&self) -> usize {
         match self {
             Self::StateSpace(model) => model.free_parameters,

@@ -222,7 +222,7 @@ words! { MapWord {
     Relu "relu" | "hinge" "A network of ramps, max(0, a); beside a linear path they are hinges",
     Step "step" "A network of steps, whose hidden weights are drawn",
     RbfFree "rbf-free" "Radial basis functions whose centres and widths are trained",
-    Auto "auto" "Of polynomials and networks the one with the best free run on rows held out",
+    Auto "auto" "Of polynomials and networks the one with the best free run on held-out rows",
     None "none" "A linear model, where the data choose",
 }}
 

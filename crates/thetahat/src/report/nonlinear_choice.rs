@@ -204,7 +204,7 @@ fn best(
             let mut report = identify_monitored(log.clone(), sources, &linear, monitor)?;
             if let Some(selection) = &mut report.selection {
                 selection.steps.push(
-                    "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on rows held out."
+                    "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on held-out rows."
                         .to_owned(),
                 );
             }

@@ -98,7 +98,7 @@ fn figure(report: &Report, horizon: Horizon) -> Option<(f64, &'static str)> {
     held.or_else(on_blocks).or_else(|| Some((of(Part::Estimation)?, "on the rows of the fit")))
 }
 
-/// That of free runs on blocks held out while the model was chosen.
+/// The fit of free runs on the blocks that were held out while the model was chosen.
 fn held_out(report: &Report) -> Option<(f64, &'static str)> {
     let selection = report.selection.as_ref()?;
     let seen = if report.model.as_state_space().is_some() {

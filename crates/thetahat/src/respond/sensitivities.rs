@@ -27,7 +27,7 @@
 //! Estimated impulses into 1/F have the covariance sigma^2 (Phi'Phi)^-1 of a regression; that counts in forecasts. On
 //! the samples they were estimated from errors are smaller for it, not larger, and nothing is added.
 //!
-//! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of
+//! The output's offset is an estimate as well. Its uncertainty is a constant k and a trend m on the right side of
 //! the equation, two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
 //! [`OffsetCovariance`](crate::model::OffsetCovariance)).
 //!

@@ -74,7 +74,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         ));
     }
     if failed > 0 {
-        steps.push(format!("The data could not determine {} more.", models(failed)));
+        steps.push(format!("{} skipped: not identifiable from this log.", models(failed)));
     }
     if last > 0 {
         steps.push(format!("Models whose C ended on the unit circle come last: {last}."));

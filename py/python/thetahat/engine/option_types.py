@@ -483,7 +483,7 @@ class ValidationOptions(TypedDict, total=False):
     lags
         Lags of the tests of residuals; short logs have fewer [default: 25]
     alpha
-        Reject where less than this chance is left [default: 0.05]
+        Significance level [default: 0.05]
     alphas
         The levels of the bands of which Anderson's test counts what lies outside [default:
         0.01,0.02,0.05,0.1,0.2]

@@ -130,7 +130,7 @@ def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: s
     ValueError
         If there is no step.
     EstimationError
-        If no response can be evaluated: the regime is not reached, the output is not at rest before, the step is lost in the noise; or the
+        If no response can be evaluated: the final steady state is not reached, the output is not at rest before, the step is lost in the noise; or the
         phase does not pass -45 degrees.
 
     Examples

@@ -1,4 +1,4 @@
-"""What a log is worth before any fit."""
+"""Checks of a log before a fit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Finding:
 
 
 class Inspection(Document):
-    """What a log is worth before any fit: the document of ``thetahat inspect``.
+    """The checks of a log before a fit: the document of ``thetahat inspect``.
 
     Examples
     --------

@@ -91,7 +91,7 @@ impl<'l> Nonlinear<'l> {
             let linear = selection.winners.as_ref().and_then(|winners| winners.simulation.held_out);
             let percent = |seen: &HeldOut| fixed(seen.percent(), 1);
             for Rival { plan, what, seen } in self.ranked(task, &selection) {
-                let nonlinear = format!("{what} fit {} % of blocks held out, in free runs", percent(&seen));
+                let nonlinear = format!("{what}, free-run fit on held-out blocks {} %", percent(&seen));
                 if !selection.is_far_behind(&seen) {
                     if selection.is_behind(&seen) {
                         let words = format!("Nonlinear: {nonlinear}; not taken, as that is not far better.");

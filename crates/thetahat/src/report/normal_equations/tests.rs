@@ -80,7 +80,7 @@ fn assert_same(found: &Report, expected: &Report, digits: f64) {
     for (a, b) in one.inputs.iter().chain([&one.output]).zip(other.inputs.iter().chain([&other.output])) {
         close(&b.name, a.offset.level, b.offset.level, b.offset.level.abs().max(1.0));
     }
-    // Where regressors nearly depend, what is open of an offset is a small difference of large numbers.
+    // Where regressors nearly depend, the uncertainty of an offset is a small difference of large numbers.
     let well = expected.estimation.condition.is_none_or(|condition| condition < 1e5);
     if let (Some(a), Some(b), true) = (&one.offset_covariance, &other.offset_covariance, well) {
         let constant = |of: &OffsetCovariance| of.covariance.last().unwrap().last().copied().unwrap();

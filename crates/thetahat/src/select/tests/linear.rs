@@ -112,7 +112,7 @@ fn models_that_the_data_leave_open_are_counted_apart() {
     let selection =
         chosen(&record, None, &Choice::Grid(grid.clone()), Select::MDL, Initial::Auto).unwrap().selection;
     assert_eq!((selection.models, selection.failed), (2, 3));
-    assert!(selection.steps.iter().any(|step| step.contains("could not determine 3 models")));
+    assert!(selection.steps.iter().any(|step| step.contains("3 models skipped: not identifiable")));
     // Nothing at all.
     let zero = vec![0.0; 100];
     let silent = Record::new(&y, vec![&zero]).unwrap();

@@ -35,7 +35,6 @@
 //! ```
 
 mod arx;
-mod border;
 mod common;
 mod criteria;
 mod criterion;
@@ -61,6 +60,7 @@ mod refinement;
 mod reflection;
 mod restart;
 mod robust;
+mod stability_boundary;
 mod start;
 mod subspace;
 #[cfg(test)]

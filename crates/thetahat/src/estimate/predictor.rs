@@ -50,8 +50,8 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 use thetahat_numerics::regression::{Folding, Products, Taps, factor_rows, sum, sum_of_squares};
 
-use super::border::Border;
 use super::polynomials::{Polynomials, Unusable};
+use super::stability_boundary::StabilityBoundary;
 use super::uncertainty::backward_filtered_products;
 use crate::data::{Record, measured};
 use crate::model::Orders;
@@ -257,7 +257,7 @@ pub(crate) struct Predictor<'a> {
     /// The normal equations of the parameters, the initial-condition responses taken out.
     pub(super) matrix: Vec<f64>,
     pub(super) right: Vec<f64>,
-    border: Border,
+    stability_boundary: StabilityBoundary,
     /// Memory for the triangle of psi: of all sections, then of one of each layout.
     foldings: Vec<Folding>,
 }
@@ -344,7 +344,7 @@ impl<'a> Predictor<'a> {
             stability: Vec::with_capacity(orders.nf.iter().copied().fold(orders.nc, usize::max)),
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
-            border: Border::new(orders, false),
+            stability_boundary: StabilityBoundary::new(orders, false),
             foldings: Vec::new(),
             layouts,
             sections,

@@ -359,7 +359,7 @@ fn uncertainty(
         let further = open.iter().map(|(moves, variance)| variance * moves[i] * moves[j]);
         Some(own + further.sum::<f64>())
     };
-    // What a wrong structure leaves may be foretold by its past so well that nothing seems open. No error is less than
+    // What a wrong structure leaves may be predicted by its past so well that nothing seems open. No error is less than
     // for white errors.
     let larger = |i: usize| {
         let ratio =

@@ -44,7 +44,7 @@ const FARTHEST: f64 = 1e4;
 /// The largest order that is offered by itself.
 const HIGHEST_ORDER: usize = 20;
 
-/// What a subspace method is told. By default the data say all of it.
+/// The options of a subspace method. By default all are decided from the data.
 ///
 /// ```
 /// use thetahat::estimate::SubspaceOptions;
@@ -56,17 +56,17 @@ const HIGHEST_ORDER: usize = 20;
 pub struct SubspaceOptions {
     /// What the singular values are of. By default SSARX.
     pub weighting: Weighting,
-    /// p, the past samples that the state is made of. By default that of the least AIC, 40 at most.
+    /// p, the number of past samples from which the state is computed. By default that of the least AIC, 40 at most.
     pub past: Option<usize>,
-    /// s, the samples of the future that the past is asked of. By default p. For SSARX p at most: more would change
+    /// s, the number of future samples that the state predicts. By default p. For SSARX at most p: more would change
     /// nothing.
     pub future: Option<usize>,
-    /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not
-    /// where past outputs tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells
-    /// of y(t) whatever D is.
+    /// Whether the inputs act on the outputs in the same sample, so that D is estimated. By default if that lowers MDL,
+    /// but not if past outputs predict the inputs, which means feedback: with a controller that acts in the same sample,
+    /// u(t) depends on y(t) whatever D is.
     pub feedthrough: Option<bool>,
     /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow;
-    /// of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
+    /// in a [`StateSpacePlan`](crate::report::StateSpacePlan) its own field `constant` decides.
     pub constant: bool,
 }
 

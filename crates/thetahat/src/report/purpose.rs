@@ -16,7 +16,7 @@ const PREDICTS: f64 = 10.0;
 const SIMULATES: f64 = 50.0;
 /// A response is known where its magnitude is within this part of it, with a probability of 95 %.
 const KNOWN: f64 = 0.3;
-/// Frequencies that are looked at: so many, so far below the highest.
+/// The number of frequencies that are evaluated, and the ratio of the lowest to the highest.
 const FREQUENCIES: usize = 61;
 const BELOW: f64 = 1e-4;
 

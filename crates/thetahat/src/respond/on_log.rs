@@ -81,7 +81,7 @@ pub(crate) struct PolynomialOnLog<'l> {
     /// What predictions are made from, and what they start from.
     ahead: Record<'l>,
     start: InitialCondition,
-    /// What is left one step ahead, once somebody asked.
+    /// The one-step residuals, computed when they are first needed.
     innovations: OnceLock<Vec<Innovations>>,
     /// What free runs are made from.
     free_run: Record<'l>,

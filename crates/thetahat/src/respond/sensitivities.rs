@@ -44,9 +44,9 @@ use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
 
-/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be
-/// told.
-const UNSEEN: f64 = 1e-20;
+/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest is
+/// not determined.
+const UNDETERMINED: f64 = 1e-20;
 
 /// A change of the polynomials, in powers of q^-1 as these are; what is fixed in them does not change.
 #[derive(Debug)]
@@ -291,7 +291,7 @@ impl Paths {
         let Basis { first, counts, .. } = &self.basis;
         found
             .iter()
-            .filter(|(size, _)| size * size > UNSEEN * largest * largest)
+            .filter(|(size, _)| size * size > UNDETERMINED * largest * largest)
             .map(|(size, vector)| {
                 let each = vector.iter().zip(&scales);
                 let mut each = each.map(|(v, scale)| if *v == 0.0 { 0.0 } else { v / size / scale });

@@ -131,10 +131,10 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
     let outcome = compare(task, models, Some(&essential))?;
-    let SelectedModel { mut selection, guess, .. } = ranked(task, outcome, None)?;
+    let SelectedModel { mut selection, initial_parameters, .. } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
-    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, guess })
+    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, initial_parameters })
 }
 
 /// What tells of a loop.

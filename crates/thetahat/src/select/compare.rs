@@ -139,7 +139,7 @@ pub(super) fn compare(
             let held_out_mse = if is_held_out { Some(held_out_mse?) } else { None };
             let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
             let noise_radius = held_out::noise_radius(&orders, &parameters);
-            let guess = (!orders.is_linear()).then_some(parameters);
+            let initial_parameters = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
             let (held_out, parts) = held_out.unzip();
             let scored = Candidate {
@@ -151,7 +151,7 @@ pub(super) fn compare(
                 score,
                 orders,
             };
-            Some(Compared { scored, guess, radius, noise_radius, parts })
+            Some(Compared { scored, initial_parameters, radius, noise_radius, parts })
         },
     );
     let models: Vec<Compared> = models.collect();

@@ -161,7 +161,7 @@ impl FittedProcess {
     }
 }
 
-/// What is read off a response.
+/// A figure of a step response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepFigure {

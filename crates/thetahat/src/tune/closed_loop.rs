@@ -95,7 +95,7 @@ fn directions(values: &[f64], spread: &[Vec<f64>]) -> Vec<Vec<f64>> {
     moves.iter().flat_map(|step| [moved(step, 1.0), moved(step, -1.0)]).collect()
 }
 
-/// How far a loop is from its border.
+/// How far a loop is from instability.
 struct Margins {
     peak: f64,
     gain: Option<f64>,

@@ -639,7 +639,7 @@ impl Objective for ProcessObjective<'_> {
         for (((column, right), value), [low, high]) in
             columns.iter_mut().zip(&mut self.right).zip(&self.point).zip(limits)
         {
-            // It would leave through the border that it stands on.
+            // It would leave through the bound that it stands on.
             if *value <= low && *right < 0.0 || *value >= high && *right > 0.0 {
                 column.fill(0.0);
                 *right = 0.0;
@@ -662,7 +662,7 @@ impl Objective for ProcessObjective<'_> {
         *refusal == Refusal::Outside
     }
 
-    /// Onto the border. What wants to leave there stays from then on, see `linearize`.
+    /// Moves parameters onto the bound that they would cross. They stay there from then on, see `linearize`.
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
         for (value, [low, high]) in trial.iter_mut().zip(self.limits()) {
             *value = value.clamp(low, high);

@@ -57,7 +57,7 @@ options! {
         lags: Option<usize>, "L", "25", TESTS;
         /// Significance level
         alpha: Option<f64>, "LEVEL", "0.05", TESTS;
-        /// The levels of the bands of which Anderson's test counts what lies outside
+        /// The levels of the bands of Anderson's test, which counts the correlations outside
         alphas: Vec<f64>, "LEVEL[,LEVEL…]", "0.01,0.02,0.05,0.1,0.2", TESTS;
     }
 }

@@ -94,8 +94,8 @@ Examples:
     ///
     /// Prints for each channel its range, mean and trend, missing and repeated values, rounding, saturation and
     /// outliers; for the clock its step and jitter; for each input its excitation, its delay and whether it follows the
-    /// output (feedback). Ends with warnings and a command line of thetahat fit that suits the log. Without -u and -y it inspects
-    /// all columns of numbers.
+    /// output (feedback). Ends with warnings and a command line of thetahat fit that suits the log. Without -u and -y
+    /// it inspects all columns of numbers.
     #[command(after_help = "\
 Examples:
   thetahat inspect log.csv --sample-time 0.08

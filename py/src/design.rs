@@ -96,7 +96,8 @@ pub(crate) fn tune(
 }
 
 /// A controller for a model: the document that `thetahat control` writes, and its table. `aim` are the poles, or the
-/// weight of the input, each with its imaginary part; `channels` what it moves and holds; `flags` whether it integrates, and cancels zeros.
+/// weight of the input, each with its imaginary part; `channels` what it moves and holds; `flags` whether it
+/// integrates, and cancels zeros.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "the package gives them by name")]
 pub(crate) fn control(

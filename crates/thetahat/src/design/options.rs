@@ -27,8 +27,8 @@ options! {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     DesignOptions of "a test signal" {
-        /// The signal: prbs, rbs, multisine, chirp, white, sines or steps; after a colon for how many samples each value
-        /// of prbs, rbs, white or steps is held, such as prbs:4. With `for` several
+        /// The signal: prbs, rbs, multisine, chirp, white, sines or steps; after a colon for how many samples each
+        /// value of prbs, rbs, white or steps is held, such as prbs:4. With `for` several
         signal: Vec<Waveform>, "SIGNAL[,SIGNAL…]", "prbs, with `for` all", SIGNAL;
         /// How many samples
         length: Option<usize>, "N", "1023, a period of a PRBS; with `for` the length whose errors are told", SIGNAL;
@@ -80,8 +80,8 @@ impl DesignOptions {
     /// that of these.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a band or a number of frequencies that none of the signals has, and a sample time that is
-    /// not the model's.
+    /// [`Error::Argument`] for a band or a number of frequencies that none of the signals has, and a sample time that
+    /// is not the model's.
     pub fn signal_plans(&self, model: &Model) -> Result<Vec<SignalPlan>, Error> {
         let all = || SignalKind::all().map(Waveform::from).collect();
         let waveforms = if self.signal.is_empty() { all() } else { self.signal.clone() };

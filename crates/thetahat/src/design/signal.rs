@@ -43,8 +43,8 @@ pub struct SignalPlan {
     pub points: Option<usize>,
     /// How many samples.
     pub length: usize,
-    /// The number of samples after which the signal repeats itself. None: of a PRBS the longest that fits into the length; of a
-    /// multisine 4096 at most; else the whole length, and no repetition of what is random.
+    /// The number of samples after which the signal repeats itself. None: of a PRBS the longest that fits into the
+    /// length; of a multisine 4096 at most; else the whole length, and no repetition of what is random.
     pub period: Option<usize>,
     /// How many signals without correlation over a period.
     pub channels: usize,

@@ -45,8 +45,8 @@ pub struct SearchOutcome {
     pub unstable_steps: usize,
     /// The initial conditions that were estimated.
     pub initial_conditions: usize,
-    /// The number of samples, in segments spread over the log, that the starts were compared on before the search on all
-    /// samples; none if all samples were used from the beginning.
+    /// The number of samples, in segments spread over the log, that the starts were compared on before the search on
+    /// all samples; none if all samples were used from the beginning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_samples: Option<usize>,
     /// The start that won.

@@ -134,8 +134,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// The best start for the search on the whole record.
     ///
-    /// For a long record the starts are compared on segments that are spread over it, by short searches: their minimum is
-    /// close to that of all samples, which then takes a few iterations.
+    /// For a long record the starts are compared on segments that are spread over it, by short searches: their minimum
+    /// is close to that of all samples, which then takes a few iterations.
     fn beginning<D: ExperimentData>(
         &self,
         data: &D,
@@ -356,8 +356,8 @@ impl Job<'_> {
         let initial_conditions = predictor.initial_conditions();
         let noise_variance = cost / (samples - size - initial_conditions) as f64;
         let known = uncertainty(predictor, orders, noise_variance);
-        // At a minimum only a flat cost has none; elsewhere, and at the boundary of stability, it may be a matter of the
-        // place.
+        // At a minimum only a flat cost has none; elsewhere, and at the boundary of stability, it may be a matter of
+        // the place.
         let settled =
             matches!(found.stopped, Stopped::Converged | Stopped::NoDescent) && !found.stability_bound;
         if known.is_none() && settled {

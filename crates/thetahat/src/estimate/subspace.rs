@@ -62,8 +62,8 @@ pub struct SubspaceOptions {
     /// nothing.
     pub future: Option<usize>,
     /// Whether the inputs act on the outputs in the same sample, so that D is estimated. By default if that lowers MDL,
-    /// but not if past outputs predict the inputs, which means feedback: with a controller that acts in the same sample,
-    /// u(t) depends on y(t) whatever D is.
+    /// but not if past outputs predict the inputs, which means feedback: with a controller that acts in the same
+    /// sample, u(t) depends on y(t) whatever D is.
     pub feedthrough: Option<bool>,
     /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow;
     /// in a [`StateSpacePlan`](crate::report::StateSpacePlan) its own field `constant` decides.

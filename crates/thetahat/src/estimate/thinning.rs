@@ -54,8 +54,8 @@ pub(super) fn thinned(record: &Record<'_>) -> Option<Packed> {
     if total < LONG { None } else { thinned_to(record, SEGMENTS, SEGMENT).map(|record| Packed::of(&record)) }
 }
 
-/// The rows from which initial parameters are sought: segments spread evenly over all, or, where the segments are short,
-/// every k-th of them; none where there are fewer than [`LONG`] rows, so that all are used.
+/// The rows from which initial parameters are sought: segments spread evenly over all, or, where the segments are
+/// short, every k-th of them; none where there are fewer than [`LONG`] rows, so that all are used.
 pub(crate) fn segments_of_starts(segments: &[Range<usize>]) -> Option<Vec<Range<usize>>> {
     let total: usize = segments.iter().map(Range::len).sum();
     if total < LONG {

@@ -60,8 +60,8 @@ options! {
         detrend: Option<Detrend>, "WHAT", "mean", CHANNELS, [P I S V N];
         /// Set a channel's offset by hand
         offset: Vec<NamedValue>, "NAME=VALUE", "", CHANNELS, [P I S V C N];
-        /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through the same
-        /// Butterworth filter; the model and its figures are those of the unfiltered signals
+        /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through the
+        /// same Butterworth filter; the model and its figures are those of the unfiltered signals
         prefilter: Option<Prefilter>, "LOW..HIGH", "", CHANNELS, [P I];
         /// The model structure
         model: Option<ModelWord>, "MODEL", "arx; without orders the data choose; with several outputs and no orders ss", MODEL,
@@ -79,19 +79,20 @@ options! {
         nd: Option<OrderRange>, "N|A..B", "", MODEL, [P];
         /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
         nf: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P];
-        /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the input
-        /// acts in the same sample
+        /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the
+        /// input acts in the same sample
         nk: Vec<DelayRange>, "N|A..B[,…]", "1; without orders the data choose", MODEL, [P I S V N];
         /// Taps of an impulse response (`model` fir): g(nk), g(nk+1), …; one value for each input or one for all
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
         /// The prior of an impulse response (`model` fir): that it decays and is smooth
         kernel: Option<KernelWord>, "KERNEL", "dc", MODEL, [I];
         /// The structure of a process in continuous time (`model` process): p and the number of lags, then d for a dead
-        /// time, z for a zero, i for an integrator, u for two lags that may be underdamped; or rc1, rc2, rc3 for parallel
-        /// lags with a direct term, as in batteries. One for each input or one for all; the clock may be irregular
+        /// time, z for a zero, i for an integrator, u for two lags that may be underdamped; or rc1, rc2, rc3 for
+        /// parallel lags with a direct term, as in batteries. One for each input or one for all; the clock may be
+        /// irregular
         structure: Vec<ProcessStructure>, "p1d|p2du|rc2|…[,…]", "", MODEL, [C R];
-        /// Poles of a transfer function in continuous time (`model` tf), 1 to 6; one number for each input or one for all;
-        /// the clock may be irregular
+        /// Poles of a transfer function in continuous time (`model` tf), 1 to 6; one number for each input or one for
+        /// all; the clock may be irregular
         np: Vec<usize>, "N[,…]", "", MODEL, [C R];
         /// Zeros of the transfer function, no more than poles; one number for each input or one for all
         nz: Vec<usize>, "N[,…]", "one less than poles", MODEL, [C R];
@@ -104,12 +105,12 @@ options! {
         likelihood: Option<LikelihoodWord>, "LIKELIHOOD", "conditional", MODEL, [P I];
         /// The initial condition of each segment
         initial: Option<Initial>, "INITIAL", "auto", MODEL, [P I S V C];
-        /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs alone),
-        /// or a number of steps ahead. auto: prediction; without orders simulation if a model for it has a clearly better
-        /// free run on held-out rows; for networks and rbf-free simulation where there are inputs
+        /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs
+        /// alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for it has a
+        /// clearly better free run on held-out rows; for networks and rbf-free simulation where there are inputs
         focus: Option<Focus>, "auto|prediction|simulation|K", "auto", MODEL, [P I S V N];
-        /// Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for step tests
-        /// and other logs whose mean is not the operating point of the plant
+        /// Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for step
+        /// tests and other logs whose mean is not the operating point of the plant
         constant: Option<Constant>, "CONSTANT", "auto", MODEL, [P I S V];
         /// Estimate a slope and the level of the output with the parameters: for drift
         trend: bool, "", "", MODEL, [P I C];
@@ -122,47 +123,47 @@ options! {
         /// The subspace method: ssarx, which is consistent in closed loop too; or moesp, n4sid, cva, which project on
         /// future inputs
         weighting: Option<Weighting>, "METHOD", "ssarx", STATES, [S];
-        /// Whether inputs act on the outputs in the same sample. auto: if that lowers MDL and no feedback from the outputs
-        /// to the inputs is found
+        /// Whether inputs act on the outputs in the same sample. auto: if that lowers MDL and no feedback from the
+        /// outputs to the inputs is found
         feedthrough: Option<FeedthroughWord>, "FEEDTHROUGH", "auto", STATES, [S];
-        /// Refine the model of the subspace method by a search for the least errors one step ahead (prediction) or of the
-        /// free run (simulation): poles, gains and responses then have standard errors
+        /// Refine the model of the subspace method by a search for the least errors one step ahead (prediction) or of
+        /// the free run (simulation): poles, gains and responses then have standard errors
         refine: Option<Refine>, "prediction|simulation", "", STATES, [S];
-        /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, each as the one that
-        /// explains most of the remaining errors, or with a network or radial basis functions that are trained
+        /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, each as the one
+        /// that explains most of the remaining errors, or with a network or radial basis functions that are trained
         narx: Option<MapWord>, "MAP", "", NARX, [P N];
         /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all
         ny: Vec<usize>, "N[,…]", "2; with auto also as the linear model that the data choose", NARX, [N];
         /// Values of each input that g reads, from `nk` on: u(k-nk), …; one number for each input or one for all
         nu: Vec<usize>, "N[,…]", "2", NARX, [N];
-        /// A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in it; may be
-        /// repeated
+        /// A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in it; may
+        /// be repeated
         regressor: Vec<String>, "EXPRESSION", "", NARX, [N];
         /// The largest number of factors of a product (poly)
         degree: Option<usize>, "D", "2", NARX, [N];
         /// The number of functions in the model
         terms: Option<usize>, "N",
             "as `select` says, by the free run on validation rows, or on blocks of the estimation rows", NARX, [N];
-        /// A product of the model, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; may be repeated. Without
-        /// it products are chosen
+        /// A product of the model, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; may be repeated.
+        /// Without it products are chosen
         term: Vec<String>, "PRODUCT", "", NARX, [N];
         /// How many functions to evaluate
         most_terms: Option<usize>, "N", "40, and 10 local models", NARX, [N];
-        /// The centres of radial basis functions (rbf): chosen among the samples, at the means of N clusters, at a grid of N
-        /// in each direction, or at N pseudo-random points
+        /// The centres of radial basis functions (rbf): chosen among the samples, at the means of N clusters, at a grid
+        /// of N in each direction, or at N pseudo-random points
         centres: Option<String>, "chosen|kmeans:N|grid:N|random:N", "chosen", NARX, [N];
         /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations
         width: Option<f64>, "SIGMA", "so that neighbours overlap", NARX, [N];
-        /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place of
-        /// planes (local), or means (knn)
+        /// Leave out the constant and the regressors themselves beside radial basis functions (rbf); constants in place
+        /// of planes (local), or means (knn)
         no_linear: bool, "", "", NARX, [N];
         /// How local models share the space of the regressors (local)
         membership: Option<Membership>, "SHAPE", "gaussian", NARX, [N];
-        /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn); bends
-        /// of each regressor (spline), 5 if not said; units that are drawn (step, `drawn`), 100 if not said
+        /// Units of a network (tanh, logistic, relu), centres (rbf-free), local models (local) or neighbours (knn);
+        /// bends of each regressor (spline), 5 if not said; units that are drawn (step, `drawn`), 100 if not said
         units: Option<usize>, "N", "chosen", NARX, [N];
-        /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else they
-        /// are trained. Those of step are always drawn
+        /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else
+        /// they are trained. Those of step are always drawn
         drawn: bool, "", "", NARX, [N];
         /// Keep signals in their own units; without it each is divided by its standard deviation
         raw_terms: bool, "", "", NARX, [N];
@@ -188,8 +189,8 @@ options! {
         /// After this time begin no iteration and no search from a further start
         time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R];
         /// The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is robust to
-        /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K = 1.345
-        /// by default); inf, the largest error
+        /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K =
+        /// 1.345 by default); inf, the largest error
         norm: Option<NormOption>, "2|1|huber[:K]|inf", "2", CRITERION, [P I];
         /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
         bound: Vec<Bound>, "NAME=LOW..HIGH", "", CRITERION, [P I];

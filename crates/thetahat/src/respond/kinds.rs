@@ -67,9 +67,9 @@ impl Model {
     }
 
     /// The default initial condition of a response to measured data: see [`InitialCondition::natural`]. Predictions of
-    /// models in equations start from the states that their text gives for the first row of a log; free runs start from the state that
-    /// explains the outputs best, as state-space models do. Nonlinear ARX models start from measured samples, processes
-    /// at rest, as they were fitted.
+    /// models in equations start from the states that their text gives for the first row of a log; free runs start from
+    /// the state that explains the outputs best, as state-space models do. Nonlinear ARX models start from measured
+    /// samples, processes at rest, as they were fitted.
     pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
             Self::Polynomial(model) => InitialCondition::natural(model, horizon),

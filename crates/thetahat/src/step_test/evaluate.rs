@@ -18,8 +18,8 @@ use crate::model::Quantity;
 const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
 /// In more than the last of them it moves by no more than this fraction of the step: a longer part has to be worth it.
 const RESTS: f64 = 0.002;
-/// The final steady state is the last part of the rows after a step; of a response without overshoot all rows after this many rise
-/// times, which are six time constants of a first order.
+/// The final steady state is the last part of the rows after a step; of a response without overshoot all rows after
+/// this many rise times, which are six time constants of a first order.
 const LAST: f64 = 0.2;
 const OVER: f64 = 2.7;
 /// Fewer rows are no level and no response.
@@ -31,8 +31,8 @@ const MOVES: f64 = 0.015;
 const ERRORS: f64 = 3.0;
 /// A larger standard error, as a fraction of the step, is that of a transient rather than of noise.
 const KNOWN: f64 = 0.03;
-/// Nor has a response without overshoot reached its final steady state this many rise times after it began: three time constants of
-/// a first order, what noise lets one see or not.
+/// Nor has a response without overshoot reached its final steady state this many rise times after it began: three time
+/// constants of a first order, what noise lets one see or not.
 const UNFINISHED: f64 = 1.35;
 /// A change of the output is lost in noise below this many standard deviations of it, or this many of its own standard
 /// errors.

@@ -128,8 +128,8 @@ impl Response<'_> {
         Some((self.time[at], (step * step / 12.0 + noisy * noisy).sqrt()))
     }
 
-    /// After which time it stays within 2 % of the final steady state, by means over as few rows as show that; none if noise hides
-    /// it.
+    /// After which time it stays within 2 % of the final steady state, by means over as few rows as show that; none if
+    /// noise hides it.
     pub(super) fn settles(&self, rise: f64) -> Option<Influence> {
         let step = self.step(self.time[self.time.len() - 1]);
         let most = (WIDEST * rise / step) as usize;

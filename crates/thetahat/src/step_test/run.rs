@@ -45,10 +45,10 @@ impl StepTestPlan {
 /// does not matter. The clock may be irregular. The response is s = (y - y0)/(y1 - y0) with y0 the mean before and y1
 /// the mean in the final steady state. [`StepFigure`] and [`StepMethod`] list what is read off it, and how.
 ///
-/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of the output
-/// about its mean at rest, before the step and in the final steady state, go through the derivatives of each figure by each row, and so
-/// do the errors of y0 and y1. They hold for the model that a way takes for granted; what a wrong one does they do not
-/// say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
+/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of the output about
+/// its mean at rest, before the step and in the final steady state, go through the derivatives of each figure by each
+/// row, and so do the errors of y0 and y1. They hold for the model that a way takes for granted; what a wrong one does
+/// they do not say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
 ///
 /// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before
 /// it, the final steady state is not reached, the change is lost in the noise, rows are too few.

@@ -110,8 +110,8 @@ options! {
         nc: Option<usize>, "N", "", MODEL, [LINEAR];
         /// Samples from input to first effect, one value for each input or one for all
         nk: Vec<usize>, "N[,…]", "1", MODEL;
-        /// Track y(k) = g(past outputs and inputs) + e(k) instead: all products of lags up to a degree (poly). Functions
-        /// that a fit has chosen come from its report, with `warm`
+        /// Track y(k) = g(past outputs and inputs) + e(k) instead: all products of lags up to a degree (poly).
+        /// Functions that a fit has chosen come from its report, with `warm`
         narx: Option<TrackMap>, "MAP", "", MODEL, [NARX];
         /// Past outputs that g reads: y(k-1), …, y(k-N)
         ny: Option<usize>, "N", "2", MODEL, [NARX];
@@ -120,16 +120,16 @@ options! {
         nu: Vec<usize>, "N[,…]", "2", MODEL, [NARX];
         /// The largest number of factors of a product
         degree: Option<usize>, "D", "2", MODEL, [NARX];
-        /// Estimate a constant too, for channels whose offsets are not known; without `offset` the first value of each is
-        /// subtracted
+        /// Estimate a constant too, for channels whose offsets are not known; without `offset` the first value of each
+        /// is subtracted
         constant: bool, "", "", MODEL, [LINEAR];
         /// The estimation method
         method: Option<TrackMethod>, "METHOD", "rls; with C rpem", ADAPTATION, [LINEAR];
         /// The forgetting policy; several run in parallel: FACTOR for exponential:FACTOR, or none, exponential:FACTOR,
         /// selective:FACTOR, random-walk:VARIANCE, variable:FACTOR:MINIMUM:NOISE_VARIANCE
         forgetting: Vec<Policy>, "HOW[,HOW…]", "exponential:0.99", ADAPTATION;
-        /// The start of the recursion: standard (from a wide prior), exact (without prior, once the samples determine the parameters),
-        /// or mixed, mixed:SAMPLES (standard, then blended into exact)
+        /// The start of the recursion: standard (from a wide prior), exact (without prior, once the samples determine
+        /// the parameters), or mixed, mixed:SAMPLES (standard, then blended into exact)
         start: Option<TrackStart>, "HOW", "standard", ADAPTATION;
         /// Do not adapt where the innovation is smaller than this, in units of the output
         dead_zone: Option<f64>, "WIDTH", "0", ADAPTATION;
@@ -140,8 +140,8 @@ options! {
         outliers: Option<TrackOutliers>, "HOW", "used", ADAPTATION;
         /// Add to each row a forecast of the output this many rows later, inputs held at their last value
         horizon: Option<usize>, "T", "", WATCH;
-        /// Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two false
-        /// alarms on average
+        /// Watch the innovations for changes of their mean and variance (CUSUM), with this many samples between two
+        /// false alarms on average
         alarm: Option<f64>, "SAMPLES", "", WATCH;
     }
 }

@@ -109,7 +109,7 @@ class StepTest(Document):
 
 @_options.takes()
 def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: str | None = None) -> StepTest:
-    """Read off the responses to the steps of a log what a course does, with the standard error of each way.
+    """Read the figures of a step test off the responses to the steps of a log, each with its standard error.
 
     Parameters
     ----------

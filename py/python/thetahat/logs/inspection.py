@@ -139,7 +139,7 @@ def inspect(
     missing: str | Sequence[str] | None = None,
     values: Mapping[str, float] | None = None,
 ) -> Inspection:
-    """Inspect a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
+    """Check a log before a fit: its clock, the quality of its channels, excitation, delays and feedback.
 
     Parameters
     ----------

@@ -95,8 +95,8 @@ pub struct TermStep {
     /// come.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_run: Option<RunFigures>,
-    /// The free run on the rows that the choice evaluated models on, where there are some; one step ahead where there are no
-    /// inputs.
+    /// The free run on the rows that the choice evaluated models on, where there are some; one step ahead where there
+    /// are no inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<RunFigures>,
 }

@@ -536,8 +536,8 @@ impl<'a> ProcessObjective<'a> {
     }
 
     /// The residuals and the columns `used` on all rows of each segment that counts; where no output was measured the
-    /// residual is NaN and the columns are zero. Gives the residuals, the columns of each segment, and the range of each
-    /// segment among the residuals.
+    /// residual is NaN and the columns are zero. Gives the residuals, the columns of each segment, and the range of
+    /// each segment among the residuals.
     #[expect(clippy::type_complexity, reason = "three lists of one thing each")]
     pub(super) fn by_segments(
         &self,

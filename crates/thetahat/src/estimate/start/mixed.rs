@@ -277,8 +277,8 @@ impl<'a> Data<'a> {
         OutputError::new(self.output, self.inputs, self.segments, self.orders, self.deadline)
     }
 
-    /// The noise model of the residuals of a plant, where there is no A; none where the residuals are rounding, or white
-    /// by the orders.
+    /// The noise model of the residuals of a plant, where there is no A; none where the residuals are rounding, or
+    /// white by the orders.
     pub(super) fn noise_of_residuals(&self, start: &Start) -> Option<Mixed> {
         if self.orders.nc + self.orders.nd == 0 {
             return None;

@@ -157,8 +157,8 @@ pub struct NonlinearArxPlan {
     /// Rows to validate on.
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is
-    /// fitted again to the first two, and evaluated on the third. None: where trained models are compared, and no rows are
-    /// to validate on, 70/30/0.
+    /// fitted again to the first two, and evaluated on the third. None: where trained models are compared, and no rows
+    /// are to validate on, 70/30/0.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -168,8 +168,8 @@ pub struct NonlinearArxPlan {
     pub output_lags: Vec<usize>,
     /// The lags of each input.
     pub input_lags: Vec<InputLags>,
-    /// Whether the lags of the chosen linear model are tried too, and used if the free run of the nonlinear model is then
-    /// better on held-out rows.
+    /// Whether the lags of the chosen linear model are tried too, and used if the free run of the nonlinear model is
+    /// then better on held-out rows.
     pub lags_chosen: bool,
     /// The functions.
     pub map: MapPlan,

@@ -73,9 +73,10 @@ pub(crate) enum Command {
     /// Fit a model to one or several logs
     ///
     /// Fits A(q) y(t) = B(q)/F(q) u(t - nk) + C(q)/D(q) e(t): by least squares where that is linear in the parameters,
-    /// else by a search for the least sum of squared prediction errors. Without orders, delay, structure and orders are
-    /// chosen from the data; orders may also be ranges. Prints a table and writes a JSON report. Several logs are
-    /// several experiments with one plant: their rows are counted through, and nothing reaches from one into the next.
+    /// else by an iterative search for the least sum of squared prediction errors. Without orders, delay, structure and
+    /// orders are chosen from the data; orders may also be ranges. Prints a table and writes a JSON report. Several
+    /// logs are several experiments with one plant: rows are numbered through all logs, and lags do not cross from one
+    /// log into the next.
     #[command(after_help = "\
 Examples:
   thetahat fit log.csv --sample-time 0.08
@@ -89,23 +90,23 @@ Examples:
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
-    /// Inspect a log before any fit
+    /// Check a log before a fit
     ///
-    /// Says of each channel its range, mean and trend, missing and repeated values, rounding, saturation and outliers;
-    /// of the clock its step and jitter; of each input how much it excites, its delay and whether it follows the
-    /// output. Ends with warnings and the line of thetahat fit that goes with the log. Without -u and -y it inspects
-    /// all columns of numbers.
+    /// Prints for each channel its range, mean and trend, missing and repeated values, rounding, saturation and
+    /// outliers; for the clock its step and jitter; for each input its excitation, its delay and whether it follows the
+    /// output (feedback). Ends with warnings and a command line of thetahat fit that suits the log. Without -u and -y
+    /// it inspects all columns of numbers.
     #[command(after_help = "\
 Examples:
   thetahat inspect log.csv --sample-time 0.08
   thetahat inspect log.csv --time t -u heater -y temperature --format json -o inspection.json")]
     Inspect(Box<InspectArguments>),
-    /// The frequency response that a log shows, without a model
+    /// Estimate the frequency response from a log, without a model
     ///
     /// From each input to the output, with coherence, the spectrum of the noise and 95 % bands: by local polynomials,
     /// by windowed covariances (Blackman and Tukey), by averages over windows (Welch), as the plain ratio of the
-    /// transforms, or for sines by correlation over whole periods. Says where the bands are not honest, where an input
-    /// has no power, and whether it follows the output. Several logs are several experiments with one plant.
+    /// transforms, or for sines by correlation over whole periods. Warns where the bands cannot be trusted, where an
+    /// input has no power, and if an input follows the output. Several logs are several experiments with one plant.
     #[command(after_help = "\
 Examples:
   thetahat spectrum log.csv --sample-time 0.08
@@ -133,23 +134,23 @@ Examples:
   thetahat simulate model.json log.csv --rows 501..1000 > simulated.csv
   thetahat simulate model.json log.csv --draws 1000 --seed 1 > bands.csv")]
     Simulate(SimulateArguments),
-    /// Say how a fitted model does on a log, and whether anything is left in its residuals
+    /// Validate a model on a log and test its residuals
     ///
-    /// Fits 1 step ahead, some steps ahead and in a free run; whiteness of the residuals by Ljung and Box's test and by
-    /// Anderson's, whose count decides by its p-value; their independence of past inputs, and a warning of feedback;
-    /// the noise beside the model's own; how often its prediction intervals hold. With --require it is a gate: exit
-    /// code 6 if the model does not meet it.
+    /// Prints the fit 1 step ahead, some steps ahead and of a free run; tests the residuals for whiteness (Ljung and
+    /// Box, Anderson) and for independence of past inputs, and warns of feedback; compares the noise with that of the
+    /// model, and the coverage of the prediction intervals with their level. With --require the exit code is 6 if the
+    /// model does not meet the requirements.
     #[command(after_help = "\
 Examples:
   thetahat validate model.json log.csv --rows 501..1000
   thetahat validate model.json log.csv --require 'independent,stable,fit>=50,fit@5>=50'
   thetahat validate model.json log.csv --format json --horizon 1,10 --lags 40 > validation.json")]
     Validate(ValidateArguments),
-    /// Put several fitted models side by side on a log
+    /// Compare several fitted models on a log
     ///
-    /// The figures of validate, a column for each model, and the alpha from which on a fraction alpha of the
-    /// correlations, or more, lies outside the band of that level (Anderson): it orders models by how white they are,
-    /// and is no verdict.
+    /// Prints the figures of validate, a column for each model, and the smallest alpha at which a fraction alpha of the
+    /// correlations, or more, lies outside the band of that level (Anderson): it ranks models by the whiteness of their
+    /// residuals, but is no test.
     #[command(after_help = "\
 Example:
   thetahat compare model.json model.json log.csv --rows 501..1000")]
@@ -157,8 +158,8 @@ Example:
     /// Identify a plant while it runs: a line for each sample of a log or a live pipe
     ///
     /// Recursive least squares for A(q) y(t) = B(q) u(t - nk) + e(t), and its extension by C(q) e(t). Each line has the
-    /// one-step prediction made before the sample, what the sample told, and the parameters after it. Ends with a table
-    /// on standard error. Runs until the log or the pipe ends, or Ctrl-C or SIGTERM end it; memory does not grow.
+    /// one-step prediction made before the sample, its innovation, and the parameters after it. Ends with a table on
+    /// standard error. Runs until the log or the pipe ends, or until Ctrl-C or SIGTERM; memory does not grow.
     #[command(after_help = "\
 Examples:
   thetahat track log.csv --na 2 --nb 2 --nk 3 --format csv > parameters.csv
@@ -170,10 +171,10 @@ Examples:
     ///
     /// MODEL is a report of fit, or a text file (TOML) with the matrices F, G, H, Q, R, or with the equations of a
     /// plant, of which unknown parameters are estimated together with the state. Each line has the states as predicted
-    /// from the rows before and as corrected by this one, with standard deviations (_sd); what was measured and
-    /// predicted of each output, and the innovation; the normalised innovation squared (nis) and between which bounds
-    /// it lies in 95 % of the rows; and held, the inputs that are missing in this row. An observer has predicted states
-    /// only. Ends with a table on standard error.
+    /// from the rows before and as corrected by this one, with standard deviations (_sd); each output as measured and
+    /// as predicted, and the innovation; the normalised innovation squared (nis) and the bounds between which it lies
+    /// in 95 % of the rows; and held, the inputs that are missing in this row. An observer has predicted states only.
+    /// Ends with a table on standard error.
     #[command(after_help = "\
 Examples:
   thetahat filter spring.toml log.csv --format csv > states.csv
@@ -203,19 +204,19 @@ since the first row) and, in [next], dt (seconds of this step). The process nois
     ///
     /// Writes CSV with a row for each input and frequency, and for the noise (input "noise"): input, frequency [rad/s],
     /// magnitude [units of the output per unit of the input] and its standard error, phase [degrees] and its standard
-    /// error. With --over the models stand beside a measured response: at each of its points its magnitude and phase,
-    /// those of the model, and whether the model lies outside of the 95 % region of their difference.
+    /// error. With --over the models are compared with a measured response: at each of its points its magnitude and
+    /// phase, those of the model, and whether the model lies outside of the 95 % region of their difference.
     #[command(after_help = "\
 Examples:
   thetahat bode model.json --frequencies 0.01..3 --points 200 > bode.csv
   thetahat bode model.json --over response.json --html bode.html > over.csv")]
     Bode(BodeArguments),
-    /// What a step test shows, or what a fitted model does after a step
+    /// Evaluate a step test, or compute the step response of a fitted model
     ///
-    /// Of a log it finds the steps of the input and reads off each response what a course does, each way with its
+    /// In a log it finds the steps of the input and reads off each response the figures of a step test, each with its
     /// standard error: gain, dead time, time constant (tangent, 63.2 %, two points, t-bar plain and weighted), rise and
-    /// settling time, and of an overshoot damping, period and natural frequency. Says which to trust. Of the document
-    /// of spectrum it takes the time constant from the frequency at which the phase is -45 degrees. Of a report it
+    /// settling time, and for an overshoot damping, period and natural frequency. Marks those to trust. From the
+    /// document of spectrum it takes the time constant at the frequency where the phase is -45 degrees. For a report it
     /// writes CSV with a row for each input and time: input, time [s], value [units of the output per unit of the
     /// input] and its standard error; the input is 1 from time 0 on, and all is at rest before.
     #[command(after_help = "\
@@ -233,11 +234,12 @@ Examples:
 Example:
   thetahat impulse model.json --samples 50 > impulse.csv")]
     Impulse(TransientArguments),
-    /// Leave out the states of a fitted model that matter least
+    /// Reduce the order of a fitted model
     ///
-    /// By balanced truncation. Without --order it prints the Hankel singular values, how much of its inputs each state
-    /// passes on to the outputs, and how far the frequency response may be off where only so many states are kept. With
-    /// --order it writes the report of the reduced model, which all verbs take.
+    /// By balanced truncation. Without --order it prints the Hankel singular values, which say how much each state
+    /// contributes from the inputs to the outputs, and for each number of states a bound of the error of the frequency
+    /// response if only these states are kept. With --order it writes the report of the reduced model, which all verbs
+    /// accept.
     #[command(after_help = "\
 Examples:
   thetahat reduce model.json
@@ -245,11 +247,12 @@ Examples:
     Reduce(ReduceArguments),
     /// A fitted model at another sample time, or in continuous time
     ///
-    /// With zoh and foh by the logarithm of the transition matrix, so that the samples of the model stay what they
-    /// were; tustin maps any poles but bends frequencies. Poles at or left of 0 have no counterpart in continuous time:
-    /// they are named, and only whole multiples of the sample time are left. Delays are taken off before, and with zoh
-    /// they may be any fraction of a sample. Models of polynomials, in state space and of processes become models in
-    /// state space. One in continuous time goes with any log: the verbs sample it as the log is.
+    /// With zoh and foh by the logarithm of the transition matrix, so that the response of the model at its sample
+    /// times does not change; tustin maps any poles but warps frequencies. Poles at 0 or negative real ones have no
+    /// counterpart in continuous time: they are named, and only whole multiples of the sample time are possible. Delays
+    /// are removed before the conversion, and with zoh they may be any fraction of a sample. Models of polynomials, in
+    /// state space and of processes become models in state space. A model in continuous time works with any log: the
+    /// verbs sample it at the times of the log.
     #[command(after_help = "\
 Examples:
   thetahat convert model.json --to continuous
@@ -258,8 +261,8 @@ Examples:
     Convert(ConvertArguments),
     /// PI and PID settings for a fitted process, and the closed loop that they give
     ///
-    /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Beside the settings
-    /// stands what the loop with the fitted process does: steps of the set point and of the load, Ms, gain and phase
+    /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Prints the settings
+    /// and the figures of the loop with the fitted process: steps of the set point and of the load, Ms, gain and phase
     /// margin, and the worst Ms within the 95 % intervals of the parameters.
     #[command(after_help = "\
 Examples:
@@ -269,9 +272,9 @@ Examples:
     /// A controller for a fitted model, and the closed loop that it gives
     ///
     /// R u = T u_c - S y with placed poles (--poles), by a linear-quadratic measure (--lqr) or of minimum variance, for
-    /// one input and one output of any linear model. Beside the coefficients stands what the loop with the model does:
-    /// its poles, a step of the set point, Ms, margins, what the noise of the model makes of output and input, and how
-    /// many models within the covariance of the parameters make a stable loop.
+    /// one input and one output of any linear model. Prints the coefficients and the figures of the loop with the
+    /// model: its poles, a step of the set point, Ms, margins, the standard deviations of output and input caused by
+    /// the noise of the model, and how many models drawn from the covariance of the parameters give a stable loop.
     #[command(after_help = "\
 Examples:
   thetahat control model.json --poles 0.8,0.7
@@ -280,21 +283,21 @@ Examples:
     Control(Box<ControlArguments>),
     /// A fitted model as source code for firmware: Rust, or C99
     ///
-    /// Without a heap, with every number in it: offsets and scales too, so that signals go in and come out in the units
-    /// of the log. It starts at rest at the offsets. With a log a test vector stands beside it: a CSV of inputs,
-    /// outputs and expected results, and a program that steps along it. What a model cannot be is refused, with what it
-    /// can.
+    /// The code needs no heap and no further data: it includes offsets and scales, so that signals are in the units of
+    /// the log. It starts at rest at the offsets. With a log it comes with a test vector: a CSV of inputs, outputs and
+    /// expected results, and a program that runs along it. If a model cannot be exported as --what says, the message
+    /// names what is possible.
     #[command(after_help = "\
 Examples:
   thetahat export model.json log.csv --to c --what predictor -o firmware
   thetahat export model.json --to rust --what simulator --precision f64 --name motor")]
     Export(Box<ExportArguments>),
-    /// Make a test signal for an experiment, or say which one a model needs, and for how long
+    /// Design a test signal for an experiment, or compare signals for a model, and how long they have to be
     ///
-    /// Writes CSV: time and the input, or the inputs u1, u2, …. What the signal is goes to standard error: its period,
-    /// mean, crest factor, order of persistent excitation (a constant has 1, a sinusoid 2) and where its power lies.
-    /// With --for it compares signals: the standard errors that each would give of the model's figures, if model and
-    /// noise are right, and how many samples it takes until they are as small as --want says.
+    /// Writes CSV: time and the input, or the inputs u1, u2, …. The figures of the signal go to standard error: its
+    /// period, mean, crest factor, order of persistent excitation (a constant has 1, a sinusoid 2) and the band of its
+    /// power. With --for it compares signals: the standard errors of the model's figures that each would give, if model
+    /// and noise are right, and how many samples are needed for the standard errors of --want.
     #[command(after_help = "\
 Examples:
   thetahat design --signal prbs:4 --length 2000 --range 20..60 > input.csv

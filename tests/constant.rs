@@ -42,7 +42,7 @@ fn a_step_test_is_right_without_a_word() {
         assert_eq!(report["estimation"].get("slope"), None);
     }
     let table = folder.done(&format!("fit {OE}")).stdout;
-    assert!(table.contains("level of y estimated with them: 313."), "{table}");
+    assert!(table.contains("operating point of 'y': 313."), "{table}");
     let without = folder.fit(&format!("{OE} --constant no"));
     assert_eq!(without["estimation"].get("level"), None);
     let errors = |report: &Value| number(report, "/estimation/mse");

@@ -115,12 +115,12 @@ fn a_choice_between_two_purposes_is_shown() {
     let report: Value = serde_json::from_str(&folder.read("report.json")).expect("a document");
     let orders = |purpose: &str| report["selection"]["winners"][purpose]["orders"].clone();
     assert_ne!(orders("prediction"), orders("simulation"));
-    assert!(of_both.contains("Free runs on rows held out"));
+    assert!(of_both.contains("Free runs on held-out rows"));
     for purpose in ["for prediction: ", "for simulation: "] {
         assert!(of_both.contains(purpose), "{purpose}");
     }
-    assert!(!page("--focus prediction").contains("Free runs on rows held out"));
-    assert!(!page("--na 2 --nb 2 --nk 3").contains("Free runs on rows held out"));
+    assert!(!page("--focus prediction").contains("Free runs on held-out rows"));
+    assert!(!page("--na 2 --nb 2 --nk 3").contains("Free runs on held-out rows"));
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn a_fit_is_shown_with_its_names_as_they_are() {
     let folder = hostile();
     let again = || fs::read(fit_page_of(&folder, "--split 60/20/20")).expect("the case is sound");
     assert!(again() == again(), "the same input gives the same bytes");
-    // Output, two times two correlations, search, delays and runs on rows held out, Bode of input and noise, step,
+    // Output, two times two correlations, search, delays and runs on held-out rows, Bode of input and noise, step,
     // impulse, roots.
     opened(&mut browser, &folder.path("page.html"), 13);
     stands(&mut browser, "h1", OUTPUT);

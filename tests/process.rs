@@ -71,7 +71,7 @@ fn every_verb_takes_a_process() {
     let table = folder.done(&format!("fit {TCLAB} --structure p2d")).stdout;
     assert!(table.contains("G = K e^(-theta s)/((1 + tau1 s) (1 + tau2 s)) from q1"), "{table}");
     let (figures, purpose) = table.split_once("Good for").expect("it is good for something");
-    assert!(figures.contains("if errors were white") && !figures.contains("rad/s"), "{table}");
+    assert!(figures.contains("assuming white residuals") && !figures.contains("rad/s"), "{table}");
     assert!(purpose.contains("control design up to"), "{table}");
     let step = folder.done("step model.json").stdout;
     let last: Vec<f64> =

@@ -146,7 +146,7 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
         ("step empty.csv -o new.txt", 3, "empty.csv"),
         ("step infinite.csv -o new.txt", 3, "infinite"),
         ("step noise.csv --time t --html new.html", 4, "which is lost in its noise"),
-        ("step log.csv --time t --rows 1..120 --report new.json", 4, "does not reach a regime"),
+        ("step log.csv --time t --rows 1..120 --report new.json", 4, "does not reach a final steady state"),
         ("step log.csv --time t --rows 1..2000", 3, "the log has 600 rows"),
         ("step log.csv --time t --rows 9..2", 2, "the last row comes before the first"),
         ("step log.csv --time t -u y", 2, "named twice"),
@@ -168,13 +168,13 @@ fn what_makes_no_sense_is_refused_and_nothing_is_written() {
 }
 
 #[test]
-fn public_logs_without_a_regime_are_refused() {
+fn public_logs_without_a_final_steady_state_are_refused() {
     let folder = folder_with("tclab_siso_step.csv");
     // Its clock is irregular, and each step ends after less than two time constants.
     folder.assert_refused(
         "step log.csv --time t -u q1 -y t1",
         4,
-        "step 1 (row 12): the output does not reach a regime",
+        "step 1 (row 12): the output does not reach a final steady state",
     );
     let folder = folder_with("hair_dryer.csv");
     folder.assert_refused("step log.csv", 4, "no step can be evaluated");

@@ -121,7 +121,7 @@ fn the_table_says_what_the_document_says() {
         "no feedback to u         25",
         "Anderson: alpha",
         "of  fraction  p-value (mid)  at 0.05",
-        "\nthe fraction outside is below alpha up to alpha ",
+        "\nwhite at levels up to ",
     ] {
         assert!(table.contains(part), "{part}:\n{table}");
     }

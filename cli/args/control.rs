@@ -41,7 +41,7 @@ pub(crate) struct ControlArguments {
         help_heading = "Design"
     )]
     pub(crate) minimum_variance: Option<f64>,
-    /// The poles of the observer, by which noise and errors are forgotten [default: the zeros of the noise model]
+    /// The poles of the observer, which set how fast noise and errors decay [default: the zeros of the noise model]
     #[arg(
         long,
         value_name = "POLE[,POLE…]",
@@ -50,7 +50,7 @@ pub(crate) struct ControlArguments {
         help_heading = "Design"
     )]
     pub(crate) observer: Vec<String>,
-    /// Whether the controller integrates, so that loads leave no error
+    /// Whether the controller integrates, so that constant loads leave no error
     #[arg(long, value_enum, value_name = "yes|no", default_value = "yes", help_heading = "Design")]
     pub(crate) integrator: IntegratorArgument,
     /// Cancel the zeros of the model, which must be inside the unit circle

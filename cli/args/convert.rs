@@ -11,7 +11,7 @@ pub(crate) struct ConvertArguments {
     /// The report that fit, reduce or convert wrote (- for standard input)
     #[arg(value_name = "REPORT")]
     pub(crate) report: PathBuf,
-    /// What to convert it to: continuous, which is continuous time, or a sample time in seconds
+    /// The target: continuous for continuous time, or a sample time in seconds
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
     pub(crate) to: String,
     /// What inputs do between samples: zoh (they keep their values), foh (they follow straight lines) or tustin (the

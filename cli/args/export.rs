@@ -25,7 +25,7 @@ pub(crate) struct ExportArguments {
     /// The precision of all numbers
     #[arg(long, value_enum, value_name = "PRECISION", default_value = "f32")]
     pub(crate) precision: PrecisionArgument,
-    /// What files, types and functions are called [default: the name of the report's file and what it is]
+    /// The name of files, types and functions [default: the name of the report's file and the value of --what]
     #[arg(long, value_name = "NAME")]
     pub(crate) name: Option<String>,
     /// Rows of the test vector, 1-based and inclusive [default: all]
@@ -51,15 +51,15 @@ pub(crate) enum LanguageArgument {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum PurposeArgument {
-    /// Predicts the next output from what was measured before
+    /// Predicts the next output from earlier measurements
     Predictor,
     /// Runs freely, driven by the inputs alone
     Simulator,
     /// Estimates the state
     Observer,
-    /// Goes on estimating the parameters, from what the fit knows
+    /// Estimates the parameters recursively, starting from the fit
     Recursive,
-    /// Says what to do
+    /// Computes the input from set point and output
     Controller,
 }
 

@@ -32,7 +32,7 @@ pub(crate) struct FilterArguments {
         help_heading = "Estimator"
     )]
     pub(crate) measurement_noise: Vec<f64>,
-    /// Where the error of the observer is to have its poles in the z plane, such as 0.4+0.3i,0.4-0.3i
+    /// The poles of the error of the observer in the z plane, such as 0.4+0.3i,0.4-0.3i
     #[arg(
         long,
         value_name = "POLE[,POLE…]",
@@ -48,8 +48,8 @@ pub(crate) struct FilterArguments {
     /// Rows to go through, 1-based and inclusive [default: all]
     #[arg(long, value_name = "A..B", help_heading = "Channels")]
     pub(crate) rows: Option<String>,
-    /// Add each state given the whole log, later rows too: nothing is written before the log ends, or if Ctrl-C comes
-    /// first
+    /// Add the smoothed states, estimated from the whole log. Lines are then written at the end of the log only, and
+    /// none after Ctrl-C
     #[arg(long, help_heading = "Output")]
     pub(crate) smooth: bool,
 
@@ -65,7 +65,7 @@ pub(crate) struct FilterArguments {
 pub(crate) enum FilterStartArgument {
     /// At rest: the channels are at their offsets
     Zero,
-    /// Anywhere: the first rows tell
+    /// Unknown: it is estimated from the first rows
     Unknown,
 }
 

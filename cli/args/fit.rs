@@ -27,12 +27,12 @@ pub(crate) struct FitArguments {
     /// name, the clock may be irregular
     #[arg(long, value_name = "MODEL", help_heading = "Model", conflicts_with = "from")]
     pub(crate) grey: Option<PathBuf>,
-    /// Fit as a plan says: options in JSON, or those of a report, whose fit is repeated; options that are given beside
-    /// it come in the place of its own
+    /// Take the options from a plan in JSON, or from a report, whose fit is then repeated; options on the command line
+    /// replace those of the plan
     #[arg(long, value_name = "FILE", help_heading = "Model")]
     pub(crate) plan: Option<PathBuf>,
 
-    /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
+    /// Write a page with charts to a file: HTML that needs no other files (- for standard output)
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) html: Option<PathBuf>,
     /// Write the JSON report to a file (- for standard output, instead of the table)
@@ -44,7 +44,7 @@ pub(crate) struct FitArguments {
     /// Read the logs once, part by part, in memory that does not grow with their rows: the same parameters, of an ARX
     /// or AR model of given orders, an impulse response, a state-space model without --refine, or a nonlinear ARX model
     /// of products (--narx poly with --term, --terms or --select mdl). With several outputs orders may be ranges.
-    /// Figures that need the log again, of free runs and of held-out rows, are left out
+    /// Figures that need a second pass, those of free runs and of held-out rows, are left out
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "grey", "from", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]

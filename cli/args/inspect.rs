@@ -38,8 +38,8 @@ pub(crate) struct InspectArguments {
     /// Write a page with charts to a file too
     #[arg(long, value_name = "FILE", help_heading = "Output", conflicts_with = "each")]
     pub(crate) html: Option<PathBuf>,
-    /// Read the log once, part by part, in memory that does not grow with its rows. What needs the whole log at once is
-    /// left out, or is that of the first rows; the warnings say so
+    /// Read the log once, part by part, in memory that does not grow with its rows. Figures that need the whole log at
+    /// once are left out, or computed from the first rows; the warnings name them
     #[arg(long, help_heading = "Output", conflicts_with_all = ["html", "resample"])]
     pub(crate) stream: bool,
     #[command(flatten)]

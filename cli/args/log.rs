@@ -60,7 +60,7 @@ pub(crate) struct LogArguments {
         help_heading = "Log format"
     )]
     pub(crate) decimal_comma: Option<bool>,
-    /// The line that has the names of the columns; what is above is left out [default: the last line of words above the
+    /// The line with the names of the columns; lines above it are ignored [default: the last line of words above the
     /// rows]
     #[arg(long, value_name = "LINE", conflicts_with = "no_header", help_heading = "Log format")]
     pub(crate) header_row: Option<u64>,
@@ -79,8 +79,8 @@ pub(crate) struct LogArguments {
     /// Lines that start with this character are comments
     #[arg(long, value_name = "CHAR", help_heading = "Log format")]
     pub(crate) comment: Option<String>,
-    /// One more word that stands for a missing value, besides empty fields, NaN, NA, N/A, null, and what historians and
-    /// spreadsheets write
+    /// A further word for a missing value, besides empty fields, NaN, NA, N/A, null, and the words of historians and
+    /// spreadsheets
     #[arg(long, value_name = "TOKEN", allow_hyphen_values = true, help_heading = "Log format")]
     pub(crate) missing: Vec<String>,
     /// A word that stands for a number, such as auto=1, besides words for off and on
@@ -108,7 +108,7 @@ pub(crate) struct ClockArguments {
     /// else s]
     #[arg(long, value_name = "UNIT", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_unit: Option<String>,
-    /// The time zone of dates without one, such as Europe/Berlin, for logs in which clocks are set
+    /// The time zone of dates without one, such as Europe/Berlin, for logs across a change to or from summer time
     #[arg(long, value_name = "ZONE", conflicts_with = "sample_time", help_heading = "Clock")]
     pub(crate) time_zone: Option<String>,
     /// Seconds from one row to the next [default: by the clock; without one 1, so that times count rows]

@@ -11,7 +11,7 @@ pub(crate) struct PredictArguments {
     /// Steps ahead; inf for a free run, like simulate
     #[arg(long, value_name = "K", default_value = "1", allow_hyphen_values = true)]
     pub(crate) horizon: String,
-    /// What stands before the first sample of a segment
+    /// The initial condition of each segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]
@@ -24,16 +24,16 @@ pub(crate) struct SimulateArguments {
     /// models)
     #[arg(long, conflicts_with = "draws")]
     pub(crate) clamp: bool,
-    /// Draw this many runs of what the model leaves open: its noise, and its parameters within their covariance
+    /// Draw this many runs with random noise and with parameters drawn from their covariance
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub(crate) draws: Option<u32>,
-    /// Which draws [default: 0]
+    /// The seed of the draws [default: 0]
     #[arg(long, value_name = "S", requires = "draws")]
     pub(crate) seed: Option<u64>,
     /// Write the drawn runs themselves to a file: CSV with a row for each row of the log, and a column for each draw
     #[arg(long, value_name = "FILE", requires = "draws")]
     pub(crate) draws_file: Option<PathBuf>,
-    /// What stands before the first sample of a segment
+    /// The initial condition of each segment
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) initial: StartArgument,
     #[command(flatten)]
@@ -45,7 +45,7 @@ pub(crate) struct BodeArguments {
     /// The report that fit wrote (- for standard input); with --over several
     #[arg(value_name = "REPORT", required = true, num_args = 1..)]
     pub(crate) reports: Vec<PathBuf>,
-    /// Lay the models over a measured response, the JSON document of spectrum: at its frequencies, beside its points
+    /// Compare the models with a measured response, the JSON document of spectrum, at its frequencies
     #[arg(long, value_name = "FILE", conflicts_with_all = ["frequencies", "points"])]
     pub(crate) over: Option<PathBuf>,
     /// With --over: write a page with charts to a file too
@@ -106,9 +106,9 @@ pub(crate) struct RespondArguments {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub(crate) enum StartArgument {
-    /// What the model needs: drop where that is all, else estimate; zero where the log has no output
+    /// drop for models that need only a few past samples, else estimate; zero where the log has no output
     Auto,
-    /// Nothing: measured samples before the rows, or the first rows, which then do not count
+    /// Measured samples before the rows; without them the first rows, which then do not count
     Drop,
     /// Zeros before the first sample
     Zero,

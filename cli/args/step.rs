@@ -20,7 +20,7 @@ pub(crate) struct StepArguments {
     #[arg(long, help_heading = "Model")]
     pub(crate) impulse: bool,
 
-    /// Of a log: rows to use, 1-based and inclusive; each range is for itself [default: all]
+    /// Of a log: rows to use, 1-based and inclusive; each range is a segment of its own [default: all]
     #[arg(long, value_name = "A..B[,C..D]", value_delimiter = ',', help_heading = "Log")]
     pub(crate) rows: Vec<String>,
     /// Of a log, or of the document of spectrum: the input [default: u, or the only one]

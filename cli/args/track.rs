@@ -25,14 +25,14 @@ pub(crate) struct TrackArguments {
     #[command(flatten)]
     pub(crate) lines: LineArguments,
 
-    /// Keep the estimator's whole state in a file, and go on from it if it is there
+    /// Keep the estimator's whole state in a file, and continue from it if the file exists
     #[arg(long, value_name = "FILE", help_heading = "State")]
     pub(crate) state: Option<PathBuf>,
-    /// Write the state every N rows, besides at the end, and within 10 s where rows are slow to come
+    /// Write the state every N rows, at the latest after 10 s, and at the end
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u64).range(1..),
         requires = "state", help_heading = "State")]
     pub(crate) save_every: u64,
-    /// Where the log stands when the state is taken up again
+    /// Where the log begins when the run continues from a state
     #[arg(long, value_enum, default_value = "auto", requires = "state", help_heading = "State")]
     pub(crate) resume: ResumeArgument,
 
@@ -46,8 +46,8 @@ pub(crate) struct TrackArguments {
 pub(crate) enum ResumeArgument {
     /// A file from its start; standard input from its start if its first row is the first one of the state, else now
     Auto,
-    /// From the start: rows that the state has absorbed are skipped
+    /// At its start: rows that the state has already used are skipped
     Start,
-    /// A live pipe that has moved on: what came in between is a gap
+    /// At the present, in a live pipe: the rows in between are a gap
     Now,
 }

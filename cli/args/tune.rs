@@ -14,14 +14,14 @@ pub(crate) struct TuneArguments {
     /// The input that the controller moves [default: the only one]
     #[arg(short = 'u', long, value_name = "NAME")]
     pub(crate) input: Option<String>,
-    /// The time constant that the closed loop shall have, tau_c or lambda, in seconds [default: the dead time by SIMC,
+    /// The wanted time constant of the closed loop, tau_c or lambda, in seconds [default: the dead time by SIMC,
     /// the longer of lag and dead time by lambda tuning]
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) lambda: Option<f64>,
     /// Which controller [default: both]
     #[arg(long, value_enum, value_name = "pi|pid")]
     pub(crate) controller: Option<ControllerArgument>,
-    /// Write a page with charts to a file: one file of HTML that needs nothing else (- for standard output)
+    /// Write a page with charts to a file: HTML that needs no other files (- for standard output)
     #[arg(long, value_name = "FILE")]
     pub(crate) html: Option<PathBuf>,
     #[command(flatten)]

@@ -16,7 +16,7 @@ pub(crate) struct ValidateArguments {
     /// input)
     #[arg(value_name = "LOG", required_unless_present = "list")]
     pub(crate) logs: Vec<PathBuf>,
-    /// What the model must be or do: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
+    /// The requirements of the model: white, independent, stable, fit>=P (percent, free run), fit@K>=P (K steps ahead),
     /// mean-error<=E and largest-error<=E (of |e| in units of the output, free run), mean-error@K<=E,
     /// largest-error@K<=E, coverage>=P (of the 95 % intervals); exit code 6 if it does not
     #[arg(long, value_name = "WHAT[,WHAT…]", value_delimiter = ',', help_heading = "Tests")]
@@ -36,8 +36,8 @@ pub(crate) struct CompareArguments {
     /// input)
     #[arg(value_name = "LOG", required = true)]
     pub(crate) path: PathBuf,
-    /// Lay the models over a measured frequency response too, the JSON document of spectrum: how many of its points
-    /// each misses
+    /// Also compare the models with a measured frequency response, the JSON document of spectrum: the number of its
+    /// points that each model misses
     #[arg(long, value_name = "RESPONSE")]
     pub(crate) over: Option<PathBuf>,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `thetahat inspect`: what a log is worth, before any fit.
+//! `thetahat inspect`: checks of a log before a fit.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;

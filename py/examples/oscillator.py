@@ -22,8 +22,8 @@ from thetahat import plot
 # ## The log
 #
 # Simulated, the input is low-pass noise at 610 Hz; between two samples the plant is integrated in 20 steps (leapfrog). The sensor has
-# noise of 0.2 mV. The first 4000 rows are to fit to, the last 2000 to judge on. Of the measured log the first nine realisations of the
-# multisine are to fit to, and the last one is to judge on.
+# noise of 0.2 mV. The first 4000 rows are for the fit, the last 2000 for the evaluation. Of the measured log the first nine realisations of
+# the multisine are for the fit, and the last one is for the evaluation.
 
 
 # %%

@@ -2,7 +2,7 @@
 # # Several outputs: from a log to a controller
 #
 # The arm of a CD player is moved by two forces and measured in two directions; an evaporator has three inputs and three outputs. Each is one
-# plant with shared states, not several. This notebook goes from a log to a state-space model, judges it on rows that it has not seen, and
+# plant with shared states, not several. This notebook goes from a log to a state-space model, evaluates it on held-out rows, and
 # hands it to python-control for a linear-quadratic Gaussian design.
 #
 # The logs are those of [DaISy](https://homes.esat.kuleuven.be/~smc/daisy/) (B. De Moor and others, K. U. Leuven). Where the environment
@@ -53,7 +53,7 @@ arm, evaporator = opened("CD_PLAYER_ARM", 2, 1, 6), opened("EVAPORATOR", 3, 2, 4
 # %% [markdown]
 # ## The models
 #
-# The first half is for the fit, the second for judging. The order is that of the least description length. The CD player was measured in
+# The first half is for the fit, the second for the evaluation. The order is that of the least description length. The CD player was measured in
 # closed loop and its arm acts within a sample: with a controller that does so too the data alone cannot tell, so it is asked for.
 
 

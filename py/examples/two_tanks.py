@@ -17,7 +17,7 @@ from thetahat import plot
 # %% [markdown]
 # ## The log
 #
-# The plant is simulated, with ten steps of Euler's method in a sample of 4 s: two logs of 1024 rows, one to fit to and one to judge on.
+# The plant is simulated, with ten steps of Euler's method in a sample of 4 s: two logs of 1024 rows, for the fit and for the evaluation.
 # The pump's voltage is a sum of slow sines with random phases; the sensor of the lower level has noise of 0.02 V.
 
 
@@ -46,7 +46,7 @@ estimate, validate = slice(0, 700), slice(700, 1024)
 # ## The best line
 #
 # Structure and orders are left to the data. Every row that follows is of the same kind: fitted to the first 700 rows, chosen by the
-# rows after them, judged on the second log, by the free run, which sees no measured output after the start.
+# rows after them, evaluated on the second log, by the free run, which sees no measured output after the start.
 
 # %%
 linear = th.search(log, estimate=estimate, validate=validate)
@@ -107,7 +107,7 @@ assert np.nanstd(trajectory.errors) < 0.1
 # ## The measured tanks
 #
 # The cascaded tanks of the nonlinear benchmarks (M. Schoukens and J. P. Noël 2017, www.nonlinearbenchmark.org) are such a pair, with a
-# lower tank that also overflows. With their files, `cascaded_tanks_est.csv` and `cascaded_tanks_val.csv`, beside this notebook, it judges
+# lower tank that also overflows. With their files, `cascaded_tanks_est.csv` and `cascaded_tanks_val.csv`, beside this notebook, it evaluates
 # the models on them too: 65 % for the line and 67 % for products of three lags, 69 % for those of five lags up to degree two.
 
 # %%

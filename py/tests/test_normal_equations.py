@@ -30,8 +30,8 @@ def log() -> th.Log:
     return th.Log(y + 50, u, sample_time=0.1)
 
 
-def cut(log: th.Log, borders: list[int]) -> list[th.NormalEquations]:
-    return [made((log[max(0, first - LAGS) : last], min(first, LAGS))) for first, last in zip(borders, borders[1:])]
+def cut(log: th.Log, boundaries: list[int]) -> list[th.NormalEquations]:
+    return [made((log[max(0, first - LAGS) : last], min(first, LAGS))) for first, last in zip(boundaries, boundaries[1:])]
 
 
 def made(piece: tuple[th.Log, int]) -> th.NormalEquations:
@@ -285,7 +285,7 @@ def test_what_does_not_fit_together_is_refused(log: th.Log) -> None:
     time = np.arange(1000) * 0.1
     clock = [th.Log(log["y"][k : k + 1000], log["u1"][k : k + 1000], time=time + 0.1 * k) for k in (0, 999)]
     pieces = [th.NormalEquations(one, 2, 2, past=past) for one, past in zip(clock, (0, 2))]
-    with pytest.raises(ValueError, match="the clock goes back over the border"):
+    with pytest.raises(ValueError, match="the clock goes back over the boundary"):
         pieces[1] | th.NormalEquations(clock[0][500:], 2, 2, past=2)
     with pytest.raises(TypeError):
         first | 3

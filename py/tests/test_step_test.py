@@ -37,7 +37,7 @@ def test_rows_and_an_uneven_clock() -> None:
 def test_what_cannot_be_read_off_is_an_error() -> None:
     with pytest.raises(ValueError, match="there is no step"):
         th.step_test(th.Log(np.arange(100.0), np.ones(100), sample_time=1.0))
-    with pytest.raises(th.EstimationError, match="does not reach a regime"):
+    with pytest.raises(th.EstimationError, match="does not reach a final steady state"):
         th.step_test(stepped(tau=300.0))
     with pytest.raises(ValueError, match="one input and one output"):
         th.step_test(th.Log(np.arange(100.0), np.ones((100, 2)), sample_time=1.0))

@@ -254,10 +254,9 @@ impl<T: Real> Forgetting<T> {
             Forgetting::None | Forgetting::RandomWalk { .. } => T::one(),
             Forgetting::Exponential { factor } | Forgetting::Selective { factor } => factor,
             Forgetting::Variable { factor, minimum, noise_variance } => {
-                let surprise =
-                    errors.iter().fold(T::zero(), |sum, &error| sum + error / noise_variance * error);
-                let surprise = surprise / T::from_count(errors.len()) / (T::one() + spread);
-                let factor = T::one() - (T::one() - factor) * surprise;
+                let nis = errors.iter().fold(T::zero(), |sum, &error| sum + error / noise_variance * error);
+                let nis = nis / T::from_count(errors.len()) / (T::one() + spread);
+                let factor = T::one() - (T::one() - factor) * nis;
                 if factor > minimum { factor } else { minimum }
             }
         }

@@ -143,7 +143,7 @@ impl<T: Real> Watch<T> {
     /// An outlier came. What counts of its square doubles with each in a row.
     #[cold]
     #[inline(never)]
-    pub(crate) fn judge(&mut self, nis: T) -> Outlier<T> {
+    pub(crate) fn evaluate(&mut self, nis: T) -> Outlier<T> {
         let (used, action) = match self.bounds {
             true => (self.part(nis), Action::Bounded),
             false if self.release > 0 && self.in_a_row >= self.release => (T::one(), Action::Released),

@@ -17,7 +17,7 @@
 //! (Levenberg 1944; Marquardt 1963; Moré, The Levenberg-Marquardt algorithm: implementation and theory, 1978; Ljung,
 //! System Identification, 2nd ed. 1999, section 10.2.) A step that leaves the region where parameters have a meaning,
 //! such as that of a stable C and F, is refused like one that raises the cost; the objective may move it back to the
-//! border.
+//! boundary.
 //!
 //! Damping alone freezes the flat directions of an ill-conditioned matrix, along which a narrow valley leads: with it
 //! an output-error fit of two inputs took 157 iterations, with halved steps 8.

@@ -270,7 +270,7 @@ struct Conversion {
     time: Option<usize>,
     clock: Option<Clock>,
     batches: Batches,
-    /// The first batch, which was looked at.
+    /// The first batch, which was read in advance.
     first: Option<RecordBatch>,
     /// How many rows were read.
     rows: u64,

@@ -35,7 +35,6 @@
 //! ```
 
 mod arx;
-mod border;
 mod common;
 mod criteria;
 mod criterion;
@@ -61,11 +60,12 @@ mod refinement;
 mod reflection;
 mod restart;
 mod robust;
+mod stability_boundary;
 mod start;
-mod stretches;
 mod subspace;
 #[cfg(test)]
 mod tests;
+mod thinning;
 mod uncertainty;
 mod vector_arx;
 
@@ -109,13 +109,13 @@ pub(crate) use process::{
 pub use refinement::{Refine, RefinementOutcome};
 pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
-pub(crate) use stretches::{LONG, seen_by_starts, stretches};
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{
     Ordered, SegmentStart, SubspaceErrors, SubspaceSums, joint_products, joint_taps, products_of_innovations,
     with_levels,
 };
 pub use thetahat_numerics::regression::Solver;
+pub(crate) use thinning::{LONG, segments_of_starts, thinned_to};
 pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
 pub(crate) use vector_arx::{VectorArxEstimate, vector_arx, vector_arx_of_sums};

@@ -1,4 +1,4 @@
-//! What a log is worth, before any fit.
+//! Checks of a log before a fit.
 //!
 //! - [`inspect()`] inspects a [`Recording`](crate::data::Recording), [`inspect_log`] at a [`Log`](crate::data::Log); an
 //!   [`InspectionPlan`] names the channels. [`PiecewiseInspection`] takes a log of any length part by part.

@@ -59,7 +59,7 @@
 //! | module | what it is for |
 //! |---|---|
 //! | [`data`] | logs, rows, records, and what is done to them before a fit |
-//! | [`inspect`] | what a log is worth before any fit |
+//! | [`inspect`] | checks of a log before a fit |
 //! | [`model`] | orders, models with polynomials, models in equations, nonlinear ARX models |
 //! | [`estimate`] | from a record and orders to parameters |
 //! | [`optimize`] | the search that estimates share |

@@ -4,7 +4,7 @@
 //!   with that the [`Structure`] (Ljung, System Identification: Theory for the User, 2nd ed. 1999, section 4.2).
 //! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and
 //!   [`Quantity`] that follows from them with an [`Interval`], and the [`Signal`]s it was fitted to.
-//!   [`OffsetCovariance`] is what is open of their offsets.
+//!   [`OffsetCovariance`] is the uncertainty of the output's offset.
 //! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states
 //!   ([`Reduced`]), in continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one
 //!   input and output. [`StateSpaceModel`] is one that was estimated as such, with any number of outputs,

@@ -1,5 +1,5 @@
-//! How to search for the parameters of the least cost: a [`Search`] says it, with an [`Algorithm`] and a [`Step`]. It
-//! tells a [`Monitor`] of its [`Progress`], and why it [`Stopped`].
+//! Options and progress of the search for the parameters of the least cost: a [`Search`] has the options, among them an
+//! [`Algorithm`] and a [`Step`]. It reports its [`Progress`] to a [`Monitor`], and why it [`Stopped`].
 //!
 //! The equations of each algorithm, and when it stops, are those of
 //! [`thetahat_numerics::optimize`](https://docs.rs/thetahat-numerics/latest/thetahat_numerics/optimize).

@@ -1,7 +1,7 @@
 #![no_std]
 #![no_main]
 //! A heater that learns its plant and designs its controller for it. One task samples and controls, the other one
-//! changes the set point and judges.
+//! changes the set point and evaluates the temperature.
 
 mod clock;
 mod heater;
@@ -24,11 +24,11 @@ type Tuner = IndirectSelfTuner<f32, Const<{ ORDERS.parameters() }>, Const<{ ORDE
 
 const PERIOD: Duration = Duration::from_secs(2);
 
-/// In °C, one after the other. After `SETTLES` the temperature is within `BOUND` K of each, for `JUDGED` samples.
+/// In °C, one after the other. After `SETTLES` the temperature is within `BOUND` K of each, for `EVALUATED` samples.
 const SET_POINTS: [f32; 6] = [60.0, 80.0, 65.0, 75.0, 55.0, 70.0];
 const SETTLES: Duration = Duration::from_secs(300);
 const BOUND: f32 = 0.5;
-const JUDGED: u32 = 50;
+const EVALUATED: u32 = 50;
 
 type Latest<T> = Signal<CriticalSectionRawMutex, T>;
 static SET_POINT: Latest<f32> = Signal::new();
@@ -59,7 +59,7 @@ async fn control(mut tuner: Tuner, mut heater: Heater) {
     }
 }
 
-/// Changes the set point, and judges.
+/// Changes the set point, and evaluates the temperature.
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let core = cortex_m::Peripherals::take().expect("they are taken once");
@@ -71,14 +71,14 @@ async fn main(spawner: Spawner) {
         SET_POINT.signal(set_point);
         Timer::after(SETTLES).await;
         let (mut worst, mut sum) = (0.0_f32, 0.0);
-        for _ in 0..JUDGED {
+        for _ in 0..EVALUATED {
             let (temperature, power) = SAMPLE.wait().await;
             let deviation = (temperature - set_point).abs();
             assert!(deviation < BOUND, "{temperature:.2} °C is not within {BOUND} K of {set_point} °C");
             worst = worst.max(deviation);
             sum += power;
         }
-        let (seconds, power) = (Instant::now().as_secs(), sum / JUDGED as f32);
+        let (seconds, power) = (Instant::now().as_secs(), sum / EVALUATED as f32);
         hprintln!("{seconds:4} s: {set_point} °C within {worst:.2} K, at {power:.0} %");
     }
     debug::exit(EXIT_SUCCESS);

@@ -169,9 +169,9 @@ def normal_equations(
     ----------
     logs : iterable, dict of names to logs, str or DataFrame
         The pieces, as for `fit_many`: files, logs, frames, delayed objects; or a data frame of Dask, whose partitions they are. Parts of
-        one log in the order of time, unless ``experiments`` says otherwise: what the model reaches back to comes from the piece before.
+        one log in the order of time, unless ``experiments`` says otherwise: the past samples that the model needs come from the piece before.
     experiments : bool, default False
-        Whether each piece is an experiment of its own, into which nothing reaches from another.
+        Whether each piece is an experiment of its own; lags then do not cross from one piece into the next.
     read : dict, optional
         How pieces are read, as for `thetahat.fit_many`.
     **orders

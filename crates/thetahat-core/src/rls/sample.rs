@@ -92,7 +92,7 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
             let weight = if resting { policy.factor() } else { lambda };
             if !resting {
                 // An outlier corrects by less, and P shrinks as by a sample with so much more noise.
-                let outlier = (nis > outliers.limit && running).then(|| outliers.judge(nis));
+                let outlier = (nis > outliers.limit && running).then(|| outliers.evaluate(nis));
                 let (noisy, growth) = match &outlier {
                     None => (noise, growth),
                     Some(outlier) => (noise * outlier.noise, outlier.growth(growth)),
@@ -139,24 +139,25 @@ impl<T: Real, N: Dimension + Dimension<M>, M: Dimension> RecursiveLeastSquares<T
         Ok((nis, action))
     }
 
-    /// Compares the variance whose turn it is with its bound; the next one is next. Returns whether any column is held.
+    /// Compares one variance with its bound, another in each sample, in turn. Returns whether any column is held.
     #[inline(always)]
     pub(super) fn hold(&mut self) -> bool {
         let (turn, n) = (usize::from(self.turn), self.bounds.len());
         let bound = self.bounds.as_slice().get(turn).copied().unwrap_or(T::INFINITY);
         let is_above = ud::diagonal(self.covariance.as_slice(), n, turn) > bound;
         if is_above || self.held.as_slice().get(turn).is_some_and(|held| *held) {
-            self.look(turn, is_above);
+            self.update_held(turn, is_above);
         }
         self.turn = if turn + 1 < n { self.turn + 1 } else { 0 };
         self.held_columns > 0
     }
 
-    /// Where P_ii > p_i, holds the columns of U that make at least p_i/n of it. If column i is held: keeps its noise,
-    /// and lets it go once it makes at most p_k/(2 n) of any P_kk.
+    /// Updates which columns of U are held. If `is_above`, so that P_ii > p_i for i = `row`, holds the columns that
+    /// contribute at least p_i/n to P_ii. A column that is held keeps its noise, and is released once it contributes at
+    /// most p_k/(2 n) to every P_kk.
     #[cold]
     #[inline(never)]
-    fn look(&mut self, row: usize, is_above: bool) {
+    fn update_held(&mut self, row: usize, is_above: bool) {
         let n = self.bounds.len();
         let RecursiveLeastSquares { covariance, bounds, held, residuals, noises, .. } = self;
         let (factor, held) = (covariance.as_slice(), held.as_mut_slice());

@@ -88,7 +88,7 @@ fn self_tuner() {
     let [(a, b), ..] = PLANTS;
     let mut plant = Plant { a, b, outputs: [0.0; 2], inputs: [0.0; 5] };
     let (mut load, mut stuck, mut farthest, mut squares) = (0.0, 0.0, [0.0_f64; BACK.len()], 0.0);
-    let (mut late, mut changes_late, mut judged) = (0, 0, 0);
+    let (mut late, mut changes_late, mut evaluated) = (0, 0, 0);
     for step in 0..steps() {
         let sample = step % BLOCK;
         if sample == 0 {
@@ -114,7 +114,7 @@ fn self_tuner() {
         }
         if sample == BLOCK - 1 {
             let band = BAND.max(4.0 * squares.sqrt());
-            judged += BACK.len();
+            evaluated += BACK.len();
             for (farthest, back) in farthest.iter().zip(BACK).filter(|(farthest, _)| **farthest > band) {
                 println!(
                     "plant {:?}: {farthest:.3} from the set point {back} samples on, where {band:.3} is allowed",
@@ -125,11 +125,11 @@ fn self_tuner() {
             changes_late += usize::from(farthest[0] > band);
         }
     }
-    println!("self-tuner: {late} of {judged} late, {changes_late} of them after a change of the plant");
+    println!("self-tuner: {late} of {evaluated} late, {changes_late} of them after a change of the plant");
     // Some are out of the band by a little more than noise: loads on the plant that integrates, with a controller that
     // was chosen slow.
     assert!(
-        50 * late <= judged && 20 * changes_late <= judged / BACK.len(),
-        "{late} {changes_late} of {judged}"
+        50 * late <= evaluated && 20 * changes_late <= evaluated / BACK.len(),
+        "{late} {changes_late} of {evaluated}"
     );
 }

@@ -78,7 +78,7 @@ pub trait Objective {
         false
     }
 
-    /// The coordinates of a search: where parameters have a region, none has a border. Says whether there are any but
+    /// The coordinates of a search: where parameters have a region, none has a boundary. Says whether there are any but
     /// the parameters themselves.
     fn coordinates(&mut self, _parameters: &[f64], _into: &mut [f64]) -> bool {
         false
@@ -107,7 +107,7 @@ pub trait Objective {
         false
     }
 
-    /// Moves parameters that are outside that region back into it, nearer to its border than those of `from`. Says
+    /// Moves parameters that are outside that region back into it, nearer to its boundary than those of `from`. Says
     /// whether that was possible.
     fn draw_in(&mut self, _from: &[f64], _trial: &mut [f64]) -> bool {
         false

@@ -52,11 +52,11 @@ pub struct Search {
     pub tolerance: f64,
     /// The step length of steepest descent.
     pub step: Step,
-    /// Searches from so many further starts: the other candidates, then random ones.
+    /// The number of further starts to search from: the other candidates, then random ones.
     pub starts: usize,
-    /// Which random starts.
+    /// The seed of the random starts.
     pub seed: u64,
-    /// After so long no iteration begins, no start is searched from, and none is looked for but the first.
+    /// After this time no iteration begins, no further start is searched from, and none but the first is computed.
     pub time_limit: Option<Duration>,
     /// One more start: parameters in their order, such as those of a model that is known to be close.
     pub initial_parameters: Option<Vec<f64>>,

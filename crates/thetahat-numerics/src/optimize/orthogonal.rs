@@ -1,5 +1,5 @@
 //! Steps by orthogonal transformations in the coordinates of the objective, for normal equations that have lost what
-//! tells their columns apart, and for regions with a border.
+//! tells their columns apart, and for regions with a boundary.
 
 use super::objective::Objective;
 
@@ -7,7 +7,7 @@ use super::objective::Objective;
 const SMALLEST_DAMPING: f64 = 1e-26;
 
 /// How far a coordinate that is no parameter moves in a step, and how far it goes at all: beyond, rounding decides on
-/// which side of the border the parameters are.
+/// which side of the boundary the parameters are.
 const LONGEST: f64 = 2.0;
 const FARTHEST: f64 = 12.0;
 

@@ -52,7 +52,7 @@ pub struct Progress {
     pub cost: f64,
 }
 
-/// Who wants to know.
+/// A function that is called with the progress of a search, and may end it.
 pub type Monitor<'a> = &'a (dyn Fn(Progress) -> ControlFlow<()> + Sync);
 
 /// What one search found.

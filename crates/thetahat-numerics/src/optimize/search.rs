@@ -14,16 +14,16 @@ const FIRST_DAMPING: f64 = 1e-8;
 const FIRST_ORTHOGONAL_DAMPING: f64 = 1e-14;
 /// The last step is taken if it predicts more than this fraction of the tolerance.
 const WORTH_TAKING: f64 = 0.01;
-/// After so many halvings no step is long enough to matter.
+/// After this many halvings no step is long enough to matter.
 const HALVINGS: usize = 40;
-/// So often trials may be drawn in from outside in vain, in a search.
+/// How often in a search trials may be moved back from outside without success.
 const DRAWN_IN: usize = 3;
 const MOST_ITERATIONS: usize = 10_000;
 /// A predicted decrease of this fraction of the cost is lost in rounding.
 const ROUNDING: f64 = 1e-10;
 /// A step that lowers the cost by this fraction of what was predicted is a good one.
 const GOOD: f64 = 0.75;
-/// Where the cost falls by so many times what was predicted, a longer step is tried.
+/// Where the cost falls by more than this multiple of the predicted decrease, a longer step is tried.
 const BETTER: f64 = 1.2;
 
 /// How the steps of an iteration are made from its normal equations.
@@ -261,7 +261,7 @@ impl<O: Objective> Descent<'_, O> {
                         && self.drawn_in < DRAWN_IN
                         && self.objective.draw_in(&self.parameters, &mut self.workspace.trial)
                     {
-                        if let Some(cost) = self.on_border() {
+                        if let Some(cost) = self.on_boundary() {
                             return Some(Accepted { cost, predicted: f64::INFINITY });
                         }
                         self.drawn_in += 1;
@@ -293,7 +293,7 @@ impl<O: Objective> Descent<'_, O> {
 
     /// The cost of a trial that was drawn in, with the parameters solved for that errors are linear in. None if it is
     /// not below that of the point where the search stands; then the objective is there again.
-    fn on_border(&mut self) -> Option<f64> {
+    fn on_boundary(&mut self) -> Option<f64> {
         let Workspace { trial, factor, moved, .. } = &mut self.workspace;
         if let Ok(cost) = solve_linear(self.objective, trial, factor, moved)
             && cost < self.cost

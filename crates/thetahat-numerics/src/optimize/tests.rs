@@ -95,7 +95,7 @@ fn all_algorithms_find_the_end_of_a_valley() {
 }
 
 #[test]
-fn a_cost_that_is_negative_is_judged_by_its_scale() {
+fn the_tolerance_of_a_negative_cost_is_relative_to_its_scale() {
     let options = Search { tolerance: 1e-6, ..Search::default() };
     let one = found(&mut Valley::new(OPEN, 0.0), &options, [-1.2, 1.0]);
     let other = found(&mut Valley::new(OPEN, -1e3), &options, [-1.2, 1.0]);

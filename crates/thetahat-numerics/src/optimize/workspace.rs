@@ -116,7 +116,7 @@ impl Workspace {
 
     /// `(H + damping I) step = g` with the least damping, in tenfold steps, that makes the matrix positive definite.
     ///
-    /// H comes from central differences of g, one-sided ones beside the border of where there is a cost: 2 p
+    /// H comes from central differences of g, one-sided ones beside the boundary of where there is a cost: 2 p
     /// linearizations.
     pub(super) fn newton_step(&mut self, objective: &mut impl Objective, parameters: &[f64], cost: f64) {
         let size = self.scales.len();

@@ -167,8 +167,8 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    /// Those of the file, the dictionaries looked at. None where there is no directory, which the reader of the file
-    /// says.
+    /// The blocks of the file, with its dictionaries checked. None where there is no directory, which the reader of the
+    /// file reports.
     pub(super) fn of(mut file: File, limits: Limits) -> io::Result<Option<Self>> {
         let mut end = [0; 10];
         let length = file.seek(SeekFrom::End(0))?;
@@ -184,19 +184,20 @@ impl Blocks {
         let batches = directory.recordBatches().iter().flatten().copied().collect();
         let dictionaries: Vec<Block> = directory.dictionaries().iter().flatten().copied().collect();
         let mut blocks = Self { file, length, limits, batches };
-        dictionaries.iter().try_for_each(|block| blocks.look(block))?;
+        dictionaries.iter().try_for_each(|block| blocks.check_block(block))?;
         Ok(Some(blocks))
     }
 
-    /// Looks at a batch before it is read.
+    /// Checks a batch before it is read.
     pub(super) fn check(&mut self, batch: usize) -> io::Result<()> {
         match self.batches.get(batch).copied() {
-            Some(block) => self.look(&block),
+            Some(block) => self.check_block(&block),
             None => Ok(()),
         }
     }
 
-    fn look(&mut self, block: &Block) -> io::Result<()> {
+    /// Checks a block: that it lies within the file, and the message in its header.
+    fn check_block(&mut self, block: &Block) -> io::Result<()> {
         let (Ok(start), Ok(header), Ok(body)) = (
             u64::try_from(block.offset()),
             u64::try_from(block.metaDataLength()),

@@ -13,7 +13,7 @@ use crate::model::Root;
 use crate::model::polynomial::{is_stable, product, roots};
 use crate::respond::StepFigures;
 
-/// Frequencies at which L is looked at.
+/// The number of frequencies at which L is evaluated.
 const FREQUENCIES: usize = 4000;
 /// A coefficient of the loop below this part of the largest is rounding.
 const ROUNDING: f64 = 1e-12;

@@ -18,8 +18,8 @@ pub struct SignalFigures {
     /// The largest deviation over their root mean square: 1 for two levels with mean in the middle, sqrt 2 for a
     /// sinusoid. None for a constant.
     pub crest_factor: Option<f64>,
-    /// The order of persistence of excitation, the mean being part of the signal: so many parameters it can tell apart.
-    /// No more than `highest`.
+    /// The order of persistence of excitation, the mean being part of the signal: the number of parameters that it can
+    /// determine. No more than `highest`.
     pub order: usize,
     /// The highest order tried: 50, or a fourth of the samples.
     pub highest: usize,
@@ -28,7 +28,7 @@ pub struct SignalFigures {
 }
 
 impl SignalFigures {
-    /// The figures of a signal with so many seconds between its samples.
+    /// The figures of a signal with this sample time in seconds.
     ///
     /// The order of persistence of excitation is the rank of the matrix of mean products u(t - i) u(t - j), i, j = 0 …
     /// n - 1 (Ljung, System Identification, 2nd ed. 1999, section 13.2): a constant has 1, a sinusoid 2, k sinusoids 2

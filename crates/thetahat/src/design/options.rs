@@ -42,13 +42,13 @@ options! {
         points: Option<usize>, "K", "every line of the period; of sines 10", SIGNAL;
         /// Repeat the signal after this many samples
         period: Option<usize>, "P", "of prbs the longest that fits, of multisine 4096 at most, else the length", SIGNAL;
-        /// How many signals without correlation
+        /// The number of uncorrelated signals
         channels: Option<usize>, "M", "1, with `for` one for each input of the model", SIGNAL;
         /// Seconds from one sample to the next
         sample_time: Option<f64>, "SECONDS", "1, with `for` that of the model", SIGNAL;
-        /// Which random signal, or where a PRBS begins
+        /// The seed of random signals, or where a PRBS begins
         seed: Option<u64>, "S", "0", SIGNAL;
-        /// Say how many samples it takes until these figures have these standard errors: a parameter, dc-gain or
+        /// Compute how many samples are needed for these standard errors of these figures: a parameter, dc-gain or
         /// time-constant (dc-gain2 is that of the second input), absolute or in percent of its value
         want: Vec<Want>, "FIGURE:ERROR[,…]", "", WORTH;
     }

@@ -16,9 +16,9 @@ const MOST_VALUES: usize = 10_000_000;
 const LONGEST_PERIOD: usize = 1 << 17;
 /// The longest that is chosen.
 const USUAL_PERIOD: usize = 1 << 12;
-/// How many frequencies a stepped-sine experiment has where nobody says.
+/// The default number of frequencies of a stepped-sine experiment.
 const FREQUENCIES: usize = 10;
-/// The lowest of these has at least so many cycles, where nobody says.
+/// The lowest of these frequencies has at least this many cycles by default.
 const CYCLES: f64 = 4.0;
 /// No fewer, of which the first may be a transient.
 const LEAST_CYCLES: f64 = 2.0;
@@ -43,8 +43,8 @@ pub struct SignalPlan {
     pub points: Option<usize>,
     /// How many samples.
     pub length: usize,
-    /// After so many samples the signal repeats itself. None: of a PRBS the longest that fits into the length; of a
-    /// multisine 4096 at most; else the whole length, and no repetition of what is random.
+    /// The number of samples after which the signal repeats itself. None: of a PRBS the longest that fits into the
+    /// length; of a multisine 4096 at most; else the whole length, and no repetition of what is random.
     pub period: Option<usize>,
     /// How many signals without correlation over a period.
     pub channels: usize,

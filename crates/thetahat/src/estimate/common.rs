@@ -7,7 +7,7 @@ use thetahat_numerics::optimize::{Deadline, Monitor, Search, best_free, search};
 use super::prediction_error::is_determined;
 use super::predictor::{InitialCondition, Predictor};
 use super::start::candidates;
-use super::stretches::energy;
+use super::thinning::energy;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;
@@ -16,16 +16,16 @@ use crate::respond::NOTHING_LEFT;
 /// A step that raises the log-likelihood by less than this fraction of one is not done.
 const SETTLED: f64 = 0.02;
 
-/// Of one initial condition, where nothing of y is left to explain.
+/// The largest price of an initial condition, for outputs that a model explains without errors.
 const LARGEST_PRICE: f64 = 100.0;
 
 /// Where in a segment errors begin, and where they count: the same for all models.
 ///
-/// In the first samples, as many as the longest model reaches back, e = 0; what 1/C makes of that fades before errors
-/// count.
+/// In the first samples, as many as the largest maximum lag of the models, e = 0; the transient of 1/C that this causes
+/// fades before errors count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Window {
-    /// How many samples the models reach back.
+    /// The largest maximum lag of the models.
     pub(crate) left_out: usize,
     /// The first sample that counts.
     pub(crate) counted: usize,
@@ -33,14 +33,14 @@ pub(crate) struct Window {
 
 /// The samples that all models are fitted to.
 ///
-/// Before a segment everything is zero; or nothing is known of it, and 1/F starts from what fits best.
+/// Before a segment all signals are zero; or they are unknown, and the initial conditions of 1/F are estimated.
 #[derive(Clone)]
 pub(crate) struct Common<'a> {
     record: &'a Record<'a>,
     begin: InitialCondition,
     window: Window,
     options: Search,
-    /// A sum of squares that is nothing.
+    /// A sum of squares below which errors are rounding.
     smallest: f64,
     deadline: Deadline,
     monitor: Monitor<'a>,

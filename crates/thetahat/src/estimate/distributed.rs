@@ -20,7 +20,7 @@ use std::ops::Range;
 
 use super::experiment_data::ExperimentData;
 use super::predictor::InitialCondition;
-use super::stretches::Packed;
+use super::thinning::Packed;
 use crate::Error;
 use crate::data::Record;
 use crate::model::Orders;

@@ -31,8 +31,8 @@ pub(crate) use uncertainty::listed;
 pub struct EquationsOutcome {
     /// The sum over all measured values of -1/2 (ln 2 pi S + e^2/S).
     pub log_likelihood: f64,
-    /// How surprising the rows were, counted by row: the mean is above what is expected if the noises of the log are
-    /// larger than those of the model. None where nothing was measured.
+    /// The normalised innovations squared of the rows: their mean is above the expected one if the noises of the log
+    /// are larger than those of the model. None where nothing was measured.
     pub nis: Option<NisSummary>,
     /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected).
     pub covariance_factor: f64,

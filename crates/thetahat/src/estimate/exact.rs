@@ -44,7 +44,7 @@ use super::arx::{out_of_range, rows, signals};
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::polynomials::Polynomials;
 use super::prediction_error::{ON_CIRCLE, flat, prediction_error, told};
-use super::stretches::{energy, filled};
+use super::thinning::{energy, filled};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::{Record, measured};
@@ -235,7 +235,7 @@ impl<'r> Job<'_, 'r> {
             filled(record, |record| add("conditional-filled", record))?;
         }
         if let Some(initial) = &self.options.initial_parameters {
-            starts.push(("guess", initial.clone()));
+            starts.push(("initial-parameters", initial.clone()));
         }
         match refused {
             Some(error) if starts.is_empty() => Err(error),
@@ -283,7 +283,7 @@ impl<'r> Job<'_, 'r> {
         Ok(best.map(|best| Reached { starts: outcomes, ..best }))
     }
 
-    /// A search that ends at the border of stability goes on from inside of it as long as that leads below.
+    /// A search that ends at the boundary of stability goes on from inside of it as long as that leads below.
     fn search(&self, likelihood: &mut Likelihood<'r>, start: &[f64]) -> Result<Option<Found>, Error> {
         let mut search = |start: &[f64]| {
             search(likelihood, start, self.options, self.smallest, self.deadline, self.monitor)

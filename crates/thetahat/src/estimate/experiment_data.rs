@@ -8,7 +8,7 @@ use thetahat_numerics::optimize::Objective;
 use super::arx::signals;
 use super::polynomials::Unusable;
 use super::predictor::{InitialCondition, Predictor};
-use super::stretches::{Packed, energy, thinned};
+use super::thinning::{Packed, energy, thinned};
 use super::uncertainty::{Autoregression, autoregression, restricted};
 use crate::Error;
 use crate::data::Record;
@@ -132,7 +132,7 @@ impl PredictionErrors for Predictor<'_> {
     }
 
     fn restricted_autoregression(&self, taken: usize) -> Option<Autoregression> {
-        let (residuals, segments) = self.stretches();
+        let (residuals, segments) = self.residuals_by_section();
         Some(restricted(&residuals, || self.sensitivities(), &segments, taken))
     }
 

@@ -84,7 +84,7 @@ impl Kernel {
     }
 }
 
-/// What the data say of the kernel of an input.
+/// The estimated parameters of the kernel of an input.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct KernelParameters {
     /// c, in units of the noise variance.

@@ -1,7 +1,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What stands for the samples before the first of a segment.
+/// The initial condition of each segment in a fit: what is assumed of the samples before its first one.
 ///
 /// Samples that were measured directly before it ([`Record::past`](crate::data::Record::past)) are past inputs and
 /// outputs, r = max(na, nb + nk - 1) + nd of them at most; only zeros do without. With r of them every sample of the

@@ -23,7 +23,7 @@
 //! so quadratically, as Newton's method.
 //!
 //! C and each F are searched for in the coordinates of [`reflection`](super::reflection), in which stability has no
-//! border. They move by up to two, or two D if that is less.
+//! boundary. They move by up to two, or two D if that is less.
 //!
 //! It starts from the least squares estimate. Memory: psi, N numbers for each unknown. Cost of an iteration: O(N p^2),
 //! and programs of some 10 p rows, or of some (N p)^(2/3) for the sum.
@@ -37,7 +37,7 @@ use super::criterion::{ConvexFit, ConvexOutcome, Norm};
 use super::outcome::ProgramsOutcome;
 use super::prediction_error::{prediction_error, predictor_of};
 use super::predictor::Predictor;
-use super::stretches::energy;
+use super::thinning::energy;
 use super::{Estimate, Initial, Procedure};
 use crate::Error;
 use crate::data::Record;

@@ -96,7 +96,7 @@ pub(crate) struct Fitted {
     /// Those of all parameters.
     pub(crate) criteria: Criteria,
     pub(crate) offset: Option<OutputOffset>,
-    /// What is open of the offset that was found.
+    /// The uncertainty of the offset that was found.
     pub(crate) open: Option<OffsetCovariance>,
 }
 

@@ -4,14 +4,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_numerics::optimize::{Algorithm, Found, Objective, Search, Step, Stopped};
 
-/// What a start led to.
+/// The result of the search from one set of initial parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StartOutcome {
-    /// Where it comes from, such as `steiglitz-mcbride`.
+    /// The method that gave the initial parameters, such as `steiglitz-mcbride`.
     pub name: String,
-    /// The mean of e^2 there; none where it cannot be computed.
+    /// The mean of e^2 at the initial parameters; none where it cannot be computed.
     pub cost: Option<f64>,
-    /// The mean of e^2 that the search from it reached, if there was one.
+    /// The mean of e^2 at the end of the search from them, if there was one.
     pub reached: Option<f64>,
 }
 
@@ -45,8 +45,8 @@ pub struct SearchOutcome {
     pub unstable_steps: usize,
     /// The initial conditions that were estimated.
     pub initial_conditions: usize,
-    /// How many samples, in stretches spread over the log, the starts were compared and searched on before the search
-    /// on all of them; none if these were all.
+    /// The number of samples, in segments spread over the log, that the starts were compared on before the search on
+    /// all samples; none if all samples were used from the beginning.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start_samples: Option<usize>,
     /// The start that won.

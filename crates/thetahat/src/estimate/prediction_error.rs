@@ -134,8 +134,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// The best start for the search on the whole record.
     ///
-    /// Of a long record the starts see stretches that are spread over it: what they lead to is close to the end, and a
-    /// few iterations on all samples are left.
+    /// For a long record the starts are compared on segments that are spread over it, by short searches: their minimum
+    /// is close to that of all samples, which then takes a few iterations.
     fn beginning<D: ExperimentData>(
         &self,
         data: &D,
@@ -356,8 +356,8 @@ impl Job<'_> {
         let initial_conditions = predictor.initial_conditions();
         let noise_variance = cost / (samples - size - initial_conditions) as f64;
         let known = uncertainty(predictor, orders, noise_variance);
-        // At a minimum only a flat cost has none; elsewhere, and at the border of stability, it may be a matter of the
-        // place.
+        // At a minimum only a flat cost has none; elsewhere, and at the boundary of stability, it may be a matter of
+        // the place.
         let settled =
             matches!(found.stopped, Stopped::Converged | Stopped::NoDescent) && !found.stability_bound;
         if known.is_none() && settled {
@@ -393,7 +393,7 @@ struct TrackStart {
     unstable_pole: Option<f64>,
     /// How many samples they were compared on, if not on all.
     samples: Option<usize>,
-    /// Whether starts from nested models were looked at, or are not worth it.
+    /// Whether starts from nested models were evaluated, or are not worth their time.
     compared: bool,
     /// What a search on the whole record has found already.
     found: Option<Found>,
@@ -416,16 +416,16 @@ fn hopeless(orders: &Orders) -> Error {
     )
 }
 
-/// What was found, said to be at the border of stability where C or an F has a root on the unit circle: a search in
-/// coordinates that know no border does not see it.
+/// What was found, said to be at the boundary of stability where C or an F has a root on the unit circle: a search in
+/// coordinates that have no boundary does not see it.
 pub(super) fn told(orders: &Orders, found: Found) -> Found {
     let model = PolynomialModel::from_parameters(orders, &found.parameters, None, 0.0, 1.0);
     let is_on_circle = |polynomial: &Vec<f64>| {
         let roots = roots(polynomial).unwrap_or_default();
         roots.iter().any(|root| root.re.hypot(root.im) > 1.0 - ON_CIRCLE)
     };
-    let at_border = model.is_ok_and(|model| std::iter::once(&model.c).chain(&model.f).any(is_on_circle));
-    Found { stability_bound: found.stability_bound || at_border, ..found }
+    let at_boundary = model.is_ok_and(|model| std::iter::once(&model.c).chain(&model.f).any(is_on_circle));
+    Found { stability_bound: found.stability_bound || at_boundary, ..found }
 }
 
 /// The covariance matrix of the parameters, and the condition number of psi.

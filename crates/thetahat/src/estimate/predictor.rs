@@ -50,8 +50,8 @@ use thetahat_core::LeastSquares;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, Dyn};
 use thetahat_numerics::regression::{Folding, Products, Taps, factor_rows, sum, sum_of_squares};
 
-use super::border::Border;
 use super::polynomials::{Polynomials, Unusable};
+use super::stability_boundary::StabilityBoundary;
 use super::uncertainty::backward_filtered_products;
 use crate::data::{Record, measured};
 use crate::model::Orders;
@@ -257,7 +257,7 @@ pub(crate) struct Predictor<'a> {
     /// The normal equations of the parameters, the initial-condition responses taken out.
     pub(super) matrix: Vec<f64>,
     pub(super) right: Vec<f64>,
-    border: Border,
+    stability_boundary: StabilityBoundary,
     /// Memory for the triangle of psi: of all sections, then of one of each layout.
     foldings: Vec<Folding>,
 }
@@ -344,7 +344,7 @@ impl<'a> Predictor<'a> {
             stability: Vec::with_capacity(orders.nf.iter().copied().fold(orders.nc, usize::max)),
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
-            border: Border::new(orders, false),
+            stability_boundary: StabilityBoundary::new(orders, false),
             foldings: Vec::new(),
             layouts,
             sections,
@@ -513,7 +513,7 @@ impl<'a> Predictor<'a> {
         }
     }
 
-    /// The errors that count, and the segments of them that follow one another.
+    /// The residuals that count, and the ranges of consecutive samples among them.
     pub(super) fn residuals(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut residuals = Vec::with_capacity(self.samples);
         let runs =
@@ -527,8 +527,9 @@ impl<'a> Predictor<'a> {
         (residuals, segments)
     }
 
-    /// The errors from the first to the last that counts in each section, NaN where an output is missing between them.
-    pub(super) fn stretches(&self) -> (Vec<f64>, Vec<Range<usize>>) {
+    /// The residuals of each section, from the first that counts to the last: NaN where an output between them is
+    /// missing.
+    pub(super) fn residuals_by_section(&self) -> (Vec<f64>, Vec<Range<usize>>) {
         let mut errors = Vec::with_capacity(self.samples);
         let each = self.sections.iter().map(|section| {
             let (rows, first) = (section.span(), errors.len());

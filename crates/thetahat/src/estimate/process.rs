@@ -345,7 +345,7 @@ fn uncertainty(
     let inverse = &root * root.transpose();
     let spread = coloured(&inverse, colour.variance * colour.inflation(samples, unknowns), &products);
     let place = |index: usize| used.iter().position(|own| *own == index);
-    // What is open of a jumping dead time alone is in `open`.
+    // The uncertainty of a jumping dead time alone is in `open`.
     let is_open = |index: usize| {
         open.iter().any(|(moves, _): &(Vec<f64>, f64)| place(index).is_none() && moves[index] != 0.0)
     };
@@ -359,7 +359,7 @@ fn uncertainty(
         let further = open.iter().map(|(moves, variance)| variance * moves[i] * moves[j]);
         Some(own + further.sum::<f64>())
     };
-    // What a wrong structure leaves may be foretold by its past so well that nothing seems open. No error is less than
+    // What a wrong structure leaves may be predicted by its past so well that nothing seems open. No error is less than
     // for white errors.
     let larger = |i: usize| {
         let ratio =

@@ -28,8 +28,8 @@ const EXACT: f64 = 1e-12;
 /// Iterations along the directions of one point.
 const ROUND: usize = 10;
 /// A direction whose information is below this fraction of that of the others, each direction by itself having 1, is
-/// not seen.
-const UNSEEN: f64 = 1e-12;
+/// not determined.
+const UNDETERMINED: f64 = 1e-12;
 
 /// Whose errors a refinement makes small.
 ///
@@ -187,7 +187,7 @@ pub(crate) fn refined(
     let number = |(number, searched): (usize, Option<Searched>)| Some((number, searched?));
     let mut searched: Vec<(usize, Searched)> = searched.into_iter().enumerate().filter_map(number).collect();
     searched.sort_by(|(_, one), (_, other)| one.found.cost().total_cmp(&other.found.cost()));
-    // At the border of stability the least errors may have no model: then the next.
+    // At the boundary of stability the least errors may have no model: then the next.
     let mut refusal = None;
     for (best, searched) in searched {
         let mut outcomes = outcomes.clone();
@@ -377,7 +377,7 @@ impl<'r> Linearized<'r> {
     }
 
     /// How the matrices of the model vary: as many independent variations of variance 1 as there are directions. Their
-    /// covariance is G^-1, or G^-1 (cov g) G^-1 where that is another one. None where a direction is not seen.
+    /// covariance is G^-1, or G^-1 (cov g) G^-1 where that is another one. None where a direction is not determined.
     fn variations(&self, scores: Option<&[f64]>) -> Option<Vec<StateSpace>> {
         let size = self.basis.ncols();
         let matrix = DMatrix::from_row_slice(size, size, self.errors.matrix());
@@ -387,7 +387,7 @@ impl<'r> Linearized<'r> {
         };
         let (values, vectors) = symmetric_eigen(&scaled(&matrix))?;
         let largest = values.iter().copied().fold(0.0, f64::max);
-        if !values.iter().all(|value| *value > UNSEEN * largest) {
+        if !values.iter().all(|value| *value > UNDETERMINED * largest) {
             return None;
         }
         let root = DMatrix::from_diagonal(&values.map(|value| 1.0 / value.sqrt()));

@@ -1,11 +1,11 @@
-//! Stable monic polynomials in coordinates without a border: z_i = artanh k_i of their reflection coefficients k_i.
+//! Stable monic polynomials in coordinates without a boundary: z_i = artanh k_i of their reflection coefficients k_i.
 //!
 //! ```text
 //! a_m(j) = a_(m-1)(j) + k_m a_(m-1)(m - j),   a_m(m) = k_m
 //! ```
 //!
 //! |k_i| < 1 for all i if and only if all roots are inside the unit circle (Schur 1917; Levinson 1947; Kay, Modern
-//! Spectral Estimation, 1988, section 6.3). In coefficients the region of stability has a curved border, at which a
+//! Spectral Estimation, 1988, section 6.3). In coefficients the region of stability has a curved boundary, at which a
 //! search stops; here it is all of space.
 
 /// The coordinates of the polynomial with these coefficients after the leading one; false if a root is not inside the
@@ -48,7 +48,7 @@ pub(super) fn coefficients(coordinates: &[f64], into: &mut [f64], slopes: Option
                 }
                 slopes[order * *stride + earlier] = 0.0;
             }
-            // 1 - tanh², as exact near the border.
+            // 1 - tanh², as exact near the boundary.
             let steepness = coordinate.cosh().powi(-2);
             for row in 0..order {
                 slopes[row * *stride + order] = into[order - 1 - row] * steepness;

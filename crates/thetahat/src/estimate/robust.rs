@@ -52,7 +52,7 @@ use super::minimax;
 use super::outcome::{SearchOutcome, StartOutcome, search_outcome};
 use super::prediction_error::{backward_products, inverse_root, prediction_error, predictor_of};
 use super::predictor::Predictor;
-use super::stretches::energy;
+use super::thinning::energy;
 use super::uncertainty::{autoregression, coloured};
 use super::{Estimate, Initial, Procedure};
 use crate::Error;

@@ -19,7 +19,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::optimize::normal;
 
 use super::refinement::RefinementOutcome;
-use super::stretches::thinned_joint;
+use super::thinning::thinned_joint;
 use crate::Error;
 use crate::data::JointRecord;
 use crate::model::{StateSpace, is_stable, riccati};
@@ -44,7 +44,7 @@ const FARTHEST: f64 = 1e4;
 /// The largest order that is offered by itself.
 const HIGHEST_ORDER: usize = 20;
 
-/// What a subspace method is told. By default the data say all of it.
+/// The options of a subspace method. By default all are decided from the data.
 ///
 /// ```
 /// use thetahat::estimate::SubspaceOptions;
@@ -56,17 +56,17 @@ const HIGHEST_ORDER: usize = 20;
 pub struct SubspaceOptions {
     /// What the singular values are of. By default SSARX.
     pub weighting: Weighting,
-    /// p, the past samples that the state is made of. By default that of the least AIC, 40 at most.
+    /// p, the number of past samples from which the state is computed. By default that of the least AIC, 40 at most.
     pub past: Option<usize>,
-    /// s, the samples of the future that the past is asked of. By default p. For SSARX p at most: more would change
+    /// s, the number of future samples that the state predicts. By default p. For SSARX at most p: more would change
     /// nothing.
     pub future: Option<usize>,
-    /// Whether the inputs act on the outputs at once, so that D is estimated. By default where that lowers MDL; but not
-    /// where past outputs tell of the inputs, which are fed back then: with a controller that acts at once, u(t) tells
-    /// of y(t) whatever D is.
+    /// Whether the inputs act on the outputs in the same sample, so that D is estimated. By default if that lowers MDL,
+    /// but not if past outputs predict the inputs, which means feedback: with a controller that acts in the same
+    /// sample, u(t) depends on y(t) whatever D is.
     pub feedthrough: Option<bool>,
     /// Whether there is a constant in each equation, from which the [levels](Subspace::levels) of the outputs follow;
-    /// of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own `constant` says it.
+    /// in a [`StateSpacePlan`](crate::report::StateSpacePlan) its own field `constant` decides.
     pub constant: bool,
 }
 
@@ -480,8 +480,8 @@ impl Subspace {
     ///
     /// with e in units of the root mean squares of the outputs (Rissanen 1978; k is the number of free parameters of a
     /// canonical form, Ljung, System Identification, 2nd ed. 1999, section 4A). Of what the last states still leave of
-    /// noise-free outputs, 1e-8 of their root mean squares is nothing. Records of 2^18 samples and more are looked at
-    /// in eight stretches of 2^14. O(N (n + l) (n + m + l)) for each order.
+    /// noise-free outputs, 1e-8 of their root mean squares is nothing. Of records of 2^18 samples and more
+    /// eight segments of 2^14 are used. O(N (n + l) (n + m + l)) for each order.
     ///
     /// # Errors
     /// [`Error::Data`] for a record with other numbers of inputs and outputs; [`Error::Argument`] for an order that is
@@ -500,14 +500,14 @@ impl Subspace {
             )));
         }
         let thinned = thinned_joint(record);
-        let looked_at = thinned.as_ref().unwrap_or(record);
+        let used = thinned.as_ref().unwrap_or(record);
         self.scored(record.samples(0) as f64, orders, |_, model, levels| {
-            let mut products = innovations::products(model, looked_at, levels)?;
+            let mut products = innovations::products(model, used, levels)?;
             for (output, scale) in self.scales[m..].iter().enumerate() {
                 products.row_mut(output).unscale_mut(*scale);
                 products.column_mut(output).unscale_mut(*scale);
             }
-            Some(products / looked_at.samples(0) as f64)
+            Some(products / used.samples(0) as f64)
         })
     }
 

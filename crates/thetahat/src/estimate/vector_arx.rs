@@ -76,18 +76,18 @@ impl FromStr for Coupling {
 /// Among which ARX models with several outputs the least MDL chooses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct VectorArxOptions {
-    /// How many past samples of the outputs there are.
+    /// The number of past samples of the outputs, chosen from this range.
     pub na: RangeInclusive<usize>,
     /// How many past samples of the inputs: a range for all of them, or a number for each.
     pub nb: VectorArxInputs,
-    /// Which past outputs an output depends on; none: the data say it.
+    /// Which past outputs an output depends on; none: decided from the data.
     pub coupling: Option<Coupling>,
-    /// By how many samples more all inputs are late, among these.
+    /// The additional delay of all inputs in samples, chosen from this range.
     pub delay: RangeInclusive<usize>,
-    /// Whether inputs act at once, so that the first of their coefficients is that of u(t).
+    /// Whether inputs act in the same sample, so that the first of their coefficients is that of u(t).
     pub direct: bool,
-    /// Whether there is a constant in each equation; of a [`StateSpacePlan`](crate::report::StateSpacePlan) its own
-    /// `constant` says it.
+    /// Whether there is a constant in each equation; in a [`StateSpacePlan`](crate::report::StateSpacePlan) its own
+    /// field `constant` decides.
     pub constant: bool,
 }
 
@@ -95,9 +95,9 @@ pub struct VectorArxOptions {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VectorArxInputs {
-    /// As many of each, among these.
+    /// The same number for all inputs, chosen from this range.
     Alike(RangeInclusive<usize>),
-    /// So many of each.
+    /// A number for each input.
     Each(Vec<usize>),
 }
 
@@ -135,7 +135,7 @@ pub struct VectorArxOutcome {
     pub a: Vec<Vec<Vec<Quantity>>>,
     /// For each input its coefficients, from its first effect on, each a list for the outputs.
     pub b: Vec<Vec<Vec<Quantity>>>,
-    /// The models that were compared, in the order in which they were looked at; empty if there was but one.
+    /// The models that were compared, in the order in which they were evaluated; empty if there was but one.
     pub tried: Vec<VectorArxScore>,
 }
 

@@ -36,7 +36,7 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
     equations.extend(model.regressors.iter().map(|regressor| {
         format!("{}, divided by {}", crate::text::harmless(&regressor.name()), regressor.scale)
     }));
-    let lines = Lines::new(&mut program, model);
+    let lines = DelayLines::new(&mut program, model);
     let z = program.memory("z", "The regressors, scaled.", vec![0.0; model.regressors.len()]);
     let outputs = model.outputs.len();
     let predicted =
@@ -68,15 +68,15 @@ pub(super) fn form(whole: &Model, model: &NonlinearArxModel, purpose: Purpose) -
     Ok(Form { program, equations, start: "at rest at the offsets".to_owned() })
 }
 
-/// The past of the signals, each divided by its scale: twice where it is read with two.
-struct Lines {
+/// The delay lines of the signals, each divided by its scale: two lines for a signal that is read with two scales.
+struct DelayLines {
     /// The signal (outputs, then inputs), the scale, and the line.
     each: Vec<(usize, f64, Array)>,
     /// For each regressor its line and its lag.
     read: Vec<(usize, usize)>,
 }
 
-impl Lines {
+impl DelayLines {
     fn new(program: &mut Program, model: &NonlinearArxModel) -> Self {
         let outputs = model.outputs.len();
         let mut sorts: Vec<(usize, f64, usize)> = Vec::new();

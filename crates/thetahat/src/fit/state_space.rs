@@ -15,7 +15,7 @@ use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions};
 use crate::report::{NormalEquations, PendingEvaluation, Report, StateSpacePlan, fit_state_space_monitored};
 use crate::select::{Focus, OrderRange};
 
-/// The orders of an ARX model that are looked at where none are given.
+/// The orders of an ARX model that are compared where none are given.
 const CHOSEN_LAGS: RangeInclusive<usize> = 1..=8;
 /// More lags than anybody has.
 const MOST_LAGS: usize = 200;

@@ -56,7 +56,10 @@ fn steps(clock: &Clock, ticks: &Ticks, plan: &InspectionPlan) -> Option<Finding>
         return Some(Finding::new(FindingKind::TwoRates, seen, advice));
     }
     let regular = ticks.regular.as_ref().filter(|_| clock.irregular)?;
-    let seen = format!("the clock is irregular {}, which a fit does not take", range());
+    let seen = format!(
+        "the clock is irregular {}; polynomial fits need an even clock, `structure` and `grey` do not",
+        range()
+    );
     Some(Finding::new(FindingKind::IrregularClock, seen, regular.to_string()))
 }
 

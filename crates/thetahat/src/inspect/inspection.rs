@@ -8,7 +8,7 @@ use crate::data::{Finding, Rows, Source};
 use crate::document::document_methods;
 use crate::validate::feedback;
 
-/// What a log is worth, before any fit. The JSON document `thetahat.inspection/1`.
+/// The checks of a log before a fit. The JSON document `thetahat.inspection/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Inspection {
     /// `thetahat.inspection/1`.

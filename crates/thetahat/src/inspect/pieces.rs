@@ -28,7 +28,7 @@ const SAME_STEP: f64 = 0.01;
 /// the rows.
 ///
 /// A log of one part is inspected as [`inspect()`](super::inspect()) does. Of several parts each figure is a sum that
-/// adds up over them, the borders included:
+/// adds up over them, the boundaries included:
 ///
 /// - exact to rounding: rows, clock (gaps, the first row at which time goes back), and of each channel what is missing,
 ///   its range, mean, standard deviation, trend, repeated values, holds, saturation; of each input its changes, order

@@ -21,7 +21,7 @@ pub(super) const BACKWARD: &str =
     "excitation, delay and feedback are left out, as the time does not run forward";
 pub(super) const IRREGULAR: &str = "excitation, delay and feedback are left out, as the log is not uniform";
 
-/// Says what a log is worth before any fit: its clock, the quality of each channel, how rich the inputs are, their
+/// Checks a log before a fit: its clock, the quality of each channel, how rich the inputs are, their
 /// delays, and whether they follow the output.
 ///
 /// Clock and quality are those of the rows as they are. Excitation, delay and feedback are of the log as a fit would

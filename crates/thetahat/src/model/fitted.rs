@@ -28,8 +28,8 @@ pub struct Parameter {
     pub standard_error: Option<f64>,
 }
 
-/// What is open of the output's offset, which is an estimate as the parameters are: found with them, or taken off
-/// before as a mean or a line. Beside it the model is, in deviations,
+/// The uncertainty of the output's offset, which is an estimate as the parameters are: found with them, or subtracted
+/// before the fit as a mean or a line. With it the model is, in deviations,
 ///
 /// ```text
 /// A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + k + m (t - t_m) + C(q)/D(q) e(t)
@@ -96,7 +96,7 @@ pub struct PolynomialModel {
     /// The covariance matrix of the parameters, row by row; none where no theory gives one, and where it cannot be
     /// computed, as at the stability boundary.
     pub covariance: Option<Vec<Vec<f64>>>,
-    /// What is open of the output's offset together with the parameters; none where it was given, where it is not
+    /// The uncertainty of the output's offset together with the parameters; none where it was given, where it is not
     /// known, and in reports that do not say. Predictions, forecasts and drawn runs count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset_covariance: Option<OffsetCovariance>,
@@ -164,8 +164,8 @@ pub(super) mod only_variance {
 }
 
 impl PolynomialModel {
-    /// The model with what is open of its output's offset as further inputs, of which the coefficients are zero and
-    /// uncertain; and those inputs over this many rows. None where nothing is said of it.
+    /// The model with the uncertainty of its output's offset as further inputs, whose coefficients are zero and
+    /// uncertain; and those inputs over this many rows. None where that uncertainty is not known.
     pub(crate) fn with_open_offset(&self, rows: usize) -> Option<(Self, Vec<Vec<f64>>)> {
         let open = self.offset_covariance.as_ref()?;
         let (count, place) = (open.count(), self.orders.na + self.orders.nb.iter().sum::<usize>());

@@ -136,7 +136,7 @@ impl Model {
         }
     }
 
-    /// How many numbers of it the data say.
+    /// The number of free parameters.
     pub fn free_parameters(&self) -> usize {
         match self {
             Self::StateSpace(model) => model.free_parameters,
@@ -343,7 +343,7 @@ impl Model {
         })
     }
 
-    /// How inputs go on between samples, of what is in continuous time and says it.
+    /// How inputs behave between samples; none for models that do not say, such as all in discrete time.
     pub(crate) fn own_hold(&self) -> Option<Hold> {
         match self {
             Self::ContinuousStateSpace(model) => Some(model.hold),

@@ -62,22 +62,22 @@ impl Interval {
     /// The whole line: the data do not determine the figure.
     pub const OPEN: Self = Self { lower: None, upper: None };
 
-    /// In words, the ends written by a function: `1.2 to 3.4`, `1.2 and more`, `3.4 and less`, `anything`.
+    /// In words, the ends written by a function: `1.2 to 3.4`, `at least 1.2`, `at most 3.4`, `not determined`.
     ///
     /// ```
     /// use thetahat::model::Interval;
     ///
     /// let shown = |lower, upper| Interval { lower, upper }.shown(|value| value.to_string());
     /// assert_eq!(shown(Some(1.5), Some(2.5)), "1.5 to 2.5");
-    /// assert_eq!(shown(Some(1.5), None), "1.5 and more");
-    /// assert_eq!([shown(None, Some(2.5)), shown(None, None)], ["2.5 and less", "anything"]);
+    /// assert_eq!(shown(Some(1.5), None), "at least 1.5");
+    /// assert_eq!([shown(None, Some(2.5)), shown(None, None)], ["at most 2.5", "not determined"]);
     /// ```
     pub fn shown(&self, number: impl Fn(f64) -> String) -> String {
         match (self.lower, self.upper) {
             (Some(lower), Some(upper)) => format!("{} to {}", number(lower), number(upper)),
-            (Some(lower), None) => format!("{} and more", number(lower)),
-            (None, Some(upper)) => format!("{} and less", number(upper)),
-            (None, None) => "anything".to_owned(),
+            (Some(lower), None) => format!("at least {}", number(lower)),
+            (None, Some(upper)) => format!("at most {}", number(upper)),
+            (None, None) => "not determined".to_owned(),
         }
     }
 }

@@ -14,7 +14,7 @@ pub struct OptionRow {
     pub help: &'static str,
     /// How a value is written, in short.
     pub notation: &'static str,
-    /// What it is where it is not given; empty: the help says it.
+    /// The default value; empty: none, or the help has it.
     pub default: &'static str,
     /// Under which heading it stands.
     pub heading: &'static str,

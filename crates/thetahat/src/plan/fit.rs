@@ -55,21 +55,21 @@ options! {
         estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E];
         /// Rows to validate on
         validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N E];
-        /// What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first K
-        /// rows); what is left of the output's level and slope `constant` and `trend` estimate
+        /// What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the first K
+        /// rows); `constant` and `trend` estimate the remaining level and slope of the output
         detrend: Option<Detrend>, "WHAT", "mean", CHANNELS, [P I S V N];
         /// Set a channel's offset by hand
         offset: Vec<NamedValue>, "NAME=VALUE", "", CHANNELS, [P I S V C N];
-        /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through one
-        /// Butterworth filter; the model and its figures are of the signals as they are
+        /// Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through the
+        /// same Butterworth filter; the model and its figures are those of the unfiltered signals
         prefilter: Option<Prefilter>, "LOW..HIGH", "", CHANNELS, [P I];
         /// The model structure
         model: Option<ModelWord>, "MODEL", "arx; without orders the data choose; with several outputs and no orders ss", MODEL,
             [P I S V C R];
         /// Coefficients of A: past outputs
         na: Option<OrderRange>, "N|A..B", "", MODEL, [P V];
-        /// Which past outputs an output depends on, where an ARX model has several: full, those of all; none, its own;
-        /// auto, what has the least MDL
+        /// Which past outputs each output of an ARX model depends on: full, those of all outputs; none, its own; auto,
+        /// those with the least MDL
         couple: Option<CoupleWord>, "COUPLE", "auto", MODEL, [V];
         /// Coefficients of B: inputs; one value for each input or one for all, 0 for a model without inputs
         nb: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P S V];
@@ -79,75 +79,78 @@ options! {
         nd: Option<OrderRange>, "N|A..B", "", MODEL, [P];
         /// Coefficients of F, the denominator from an input alone; one value for each input or one for all
         nf: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P];
-        /// Samples from input to first effect, one value for each input or one for all; 0: the input acts at once
+        /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the
+        /// input acts in the same sample
         nk: Vec<DelayRange>, "N|A..B[,…]", "1; without orders the data choose", MODEL, [P I S V N];
         /// Taps of an impulse response (`model` fir): g(nk), g(nk+1), …; one value for each input or one for all
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
-        /// What is known of an impulse response before the data (`model` fir): that it decays and is smooth
+        /// The prior of an impulse response (`model` fir): that it decays and is smooth
         kernel: Option<KernelWord>, "KERNEL", "dc", MODEL, [I];
-        /// What a process in continuous time has (`model` process): p, how many lags, then d for a dead time, z a zero,
-        /// i an integrator, u two lags that may be underdamped; or rc1, rc2, rc3 for lags side by side with a direct
-        /// term, as batteries have them. One for each input or one for all; the clock may be irregular
+        /// The structure of a process in continuous time (`model` process): p and the number of lags, then d for a dead
+        /// time, z for a zero, i for an integrator, u for two lags that may be underdamped; or rc1, rc2, rc3 for
+        /// parallel lags with a direct term, as in batteries. One for each input or one for all; the clock may be
+        /// irregular
         structure: Vec<ProcessStructure>, "p1d|p2du|rc2|…[,…]", "", MODEL, [C R];
         /// Poles of a transfer function in continuous time (`model` tf), 1 to 6; one number for each input or one for
         /// all; the clock may be irregular
         np: Vec<usize>, "N[,…]", "", MODEL, [C R];
-        /// Its zeros, no more than poles; one number for each input or one for all
+        /// Zeros of the transfer function, no more than poles; one number for each input or one for all
         nz: Vec<usize>, "N[,…]", "one less than poles", MODEL, [C R];
-        /// Search for a dead time of each input too
+        /// Estimate a dead time of each input too
         delay: bool, "", "", MODEL, [C R];
-        /// How to estimate
+        /// The estimation method
         method: Option<MethodWord>, "METHOD", "pem", MODEL, [P I];
-        /// Which likelihood to make large, given the first samples or of all of them: exact goes on through missing
-        /// outputs (models without D and F)
+        /// The likelihood to maximise, conditional on the first samples or that of all samples (exact), which continues
+        /// through missing outputs (models without D and F)
         likelihood: Option<LikelihoodWord>, "LIKELIHOOD", "conditional", MODEL, [P I];
-        /// What stands before the first sample of a segment
+        /// The initial condition of each segment
         initial: Option<Initial>, "INITIAL", "auto", MODEL, [P I S V C];
         /// What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the inputs
-        /// alone), or a number of steps ahead. auto: prediction, unless without orders another model simulates rows
-        /// held out from it clearly better; of networks and rbf-free simulation where there are inputs
+        /// alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for it has a
+        /// clearly better free run on held-out rows; for networks and rbf-free simulation where there are inputs
         focus: Option<Focus>, "auto|prediction|simulation|K", "auto", MODEL, [P I S V N];
-        /// Estimate the level of the output with the parameters, beside the mean that is taken off: for step tests and
-        /// other logs of which the mean is not where the plant rests
+        /// Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for step
+        /// tests and other logs whose mean is not the operating point of the plant
         constant: Option<Constant>, "CONSTANT", "auto", MODEL, [P I S V];
-        /// Estimate a slope of the output with the parameters too, and its level with it: for drift
+        /// Estimate a slope and the level of the output with the parameters: for drift
         trend: bool, "", "", MODEL, [P I C];
-        /// States, or a range among which the least MDL chooses
+        /// The number of states, or a range, from which the least MDL is chosen
         order: Option<OrderRange>, "N|A..B", "1..20", STATES, [S];
-        /// Past samples that the states are made of
-        past: Option<usize>, "P", "those of the least AIC, 40 at most", STATES, [S];
-        /// Future samples that the states are to tell of
+        /// Past samples from which the states are computed
+        past: Option<usize>, "P", "the number with the least AIC, 40 at most", STATES, [S];
+        /// Future samples that the states predict
         future: Option<usize>, "S", "as many as past ones", STATES, [S];
-        /// Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future inputs
+        /// The subspace method: ssarx, which is consistent in closed loop too; or moesp, n4sid, cva, which project on
+        /// future inputs
         weighting: Option<Weighting>, "METHOD", "ssarx", STATES, [S];
-        /// Whether inputs act on the outputs in the same sample. auto: where that lowers MDL and no controller is seen
-        /// that feeds outputs back to the inputs
+        /// Whether inputs act on the outputs in the same sample. auto: if that lowers MDL and no feedback from the
+        /// outputs to the inputs is found
         feedthrough: Option<FeedthroughWord>, "FEEDTHROUGH", "auto", STATES, [S];
-        /// Search from there for the least errors one step ahead (prediction) or of the free run (simulation): poles,
-        /// gains and responses then have standard errors
+        /// Refine the model of the subspace method by a search for the least errors one step ahead (prediction) or of
+        /// the free run (simulation): poles, gains and responses then have standard errors
         refine: Option<Refine>, "prediction|simulation", "", STATES, [S];
-        /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, that which explains
-        /// most of what is left comes next, or with a network or radial basis functions that are trained
+        /// Fit y(k) = g(past outputs and inputs) + e(k): with functions that are chosen one by one, each as the one
+        /// that explains most of the remaining errors, or with a network or radial basis functions that are trained
         narx: Option<MapWord>, "MAP", "", NARX, [P N];
         /// Past outputs that g reads: y(k-1), …, y(k-N); one number for each output or one for all
         ny: Vec<usize>, "N[,…]", "2; with auto also as the linear model that the data choose", NARX, [N];
         /// Values of each input that g reads, from `nk` on: u(k-nk), …; one number for each input or one for all
         nu: Vec<usize>, "N[,…]", "2", NARX, [N];
-        /// An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it; once
-        /// for each
+        /// A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in it; may
+        /// be repeated
         regressor: Vec<String>, "EXPRESSION", "", NARX, [N];
-        /// Factors of a product at most (poly)
+        /// The largest number of factors of a product (poly)
         degree: Option<usize>, "D", "2", NARX, [N];
-        /// How many functions to take
+        /// The number of functions in the model
         terms: Option<usize>, "N",
             "as `select` says, by the free run on validation rows, or on blocks of the estimation rows", NARX, [N];
-        /// A product to take, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; once for each. Without it
-        /// they are chosen
+        /// A product of the model, as a report writes it (poly): 1, y(k-1) or 'y(k-1)^2*u(k-1)'; may be repeated.
+        /// Without it products are chosen
         term: Vec<String>, "PRODUCT", "", NARX, [N];
-        /// How many functions to look at
+        /// How many functions to evaluate
         most_terms: Option<usize>, "N", "40, and 10 local models", NARX, [N];
-        /// Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a grid of
-        /// N in each direction, or at N pseudo-random points
+        /// The centres of radial basis functions (rbf): chosen among the samples, at the means of N clusters, at a grid
+        /// of N in each direction, or at N pseudo-random points
         centres: Option<String>, "chosen|kmeans:N|grid:N|random:N", "chosen", NARX, [N];
         /// sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations
         width: Option<f64>, "SIGMA", "so that neighbours overlap", NARX, [N];
@@ -162,18 +165,18 @@ options! {
         /// Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu); else
         /// they are trained. Those of step are always drawn
         drawn: bool, "", "", NARX, [N];
-        /// Leave signals in their own units: else each is divided by its standard deviation
+        /// Keep signals in their own units; without it each is divided by its standard deviation
         raw_terms: bool, "", "", NARX, [N];
-        /// Which models of the ranges are tried
+        /// Which models of the ranges are compared
         path: Option<Path>, "PATH", "all", CHOICE, [P];
-        /// What makes one model better than another
+        /// The criterion of the choice
         select: Option<Select>, "CRITERION", "mdl", CHOICE, [P N];
         /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted
-        /// again to the first two and evaluated on the third; 0 for a part that is not wanted
+        /// again to the first two and evaluated on the third; 0 for no such part
         split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N E];
-        /// How steps are chosen
+        /// The search algorithm
         search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R];
-        /// Iterations at most, from each start
+        /// The largest number of iterations from each start
         max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R];
         /// Stop where the next step would lower the cost by less than this fraction
         tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R];
@@ -181,21 +184,21 @@ options! {
         step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R];
         /// Search from this many further starts
         starts: Option<usize>, "K", "0, with `narx` 4", SEARCH, [P C N E R];
-        /// Which random starts, or which random centres
+        /// The seed of random starts and of random centres
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
-        /// After so long begin no iteration, and look for no further start
+        /// After this time begin no iteration and no search from a further start
         time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R];
-        /// What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not rule; huber
-        /// or huber:K, of squares up to K times the scale of the errors and of absolute values beyond (K = 1.345 if not
-        /// said); inf, the largest error
+        /// The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is robust to
+        /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K =
+        /// 1.345 by default); inf, the largest error
         norm: Option<NormOption>, "2|1|huber[:K]|inf", "2", CRITERION, [P I];
         /// Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
         bound: Vec<Bound>, "NAME=LOW..HIGH", "", CRITERION, [P I];
         /// Keep the static gain from an input in a range, or at a value
         dc_gain: Vec<GainBound>, "[INPUT=]G|LOW..HIGH", "", CRITERION, [P I];
-        /// Keep parameters small: weighs like this many more samples in which the output is 0
+        /// Ridge regression, which keeps parameters small: its weight, as a number of further samples with output 0
         ridge: Option<f64>, "SAMPLES", "0", CRITERION, [P I N];
-        /// Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+        /// A bound that no error may exceed, in units of the output; finds the box of all parameters that satisfy it
         noise_bound: Option<f64>, "E", "", CRITERION, [P I];
     }
 }

@@ -95,9 +95,9 @@ pub enum CoupleWord {
 }
 
 words! { of CoupleWord {
-    Full "full" "Those of all",
+    Full "full" "Those of all outputs",
     None "none" "Its own",
-    Auto "auto" "What has the least MDL",
+    Auto "auto" "Those with the least MDL",
 }}
 
 /// What is known of an impulse response before the data.
@@ -112,9 +112,9 @@ pub enum KernelWord {
 }
 
 words! { of KernelWord {
-    Dc "dc" "Decay and smoothness each have a number of their own, which the likelihood says",
-    Tc "tc" "One number for both",
-    None "none" "Nothing: least squares",
+    Dc "dc" "A parameter each for decay and smoothness, both of maximum likelihood",
+    Tc "tc" "One parameter for both",
+    None "none" "No prior: least squares",
 }}
 
 /// How to estimate.
@@ -151,15 +151,15 @@ words! { of LikelihoodWord {
 }}
 
 words! { of Initial {
-    Auto "auto" "drop without F; with F estimate where rows stand before, or it is worth its parameters, else zero",
-    Drop "drop" "What was measured before; where nothing was, samples without a full regressor are left out (models without F)",
+    Auto "auto" "drop without F; with F estimate if there are rows before, or if it is worth its parameters, else zero",
+    Drop "drop" "Measured samples before; without them, samples without a full regressor are left out (models without F)",
     Zero "zero" "Zeros",
-    Estimate "estimate" "What was measured before, and what fits best, found with the parameters (models with F, processes, or \
-        `likelihood` exact with inputs)",
+    Estimate "estimate" "Measured samples before, and initial conditions estimated with the parameters (models with F, processes, \
+        or `likelihood` exact with inputs)",
 }}
 
 words! { of Constant {
-    Auto "auto" "Where it lowers MDL, unless the output's offset is given (`detrend` none, `offset`)",
+    Auto "auto" "If it lowers MDL, unless the output's offset is given (`detrend` none, `offset`)",
     Yes "yes" "Always",
     No "no" "Never",
 }}
@@ -178,8 +178,8 @@ pub enum FeedthroughWord {
 
 words! { of FeedthroughWord {
     Auto "auto" "Decided from the data",
-    Yes "yes" "They do: D is estimated",
-    No "no" "They do not: D is zero",
+    Yes "yes" "D is estimated",
+    No "no" "D is zero",
 }}
 
 /// The functions of a nonlinear ARX model.
@@ -222,8 +222,8 @@ words! { MapWord {
     Relu "relu" | "hinge" "A network of ramps, max(0, a); beside a linear path they are hinges",
     Step "step" "A network of steps, whose hidden weights are drawn",
     RbfFree "rbf-free" "Radial basis functions whose centres and widths are trained",
-    Auto "auto" "Of polynomials and networks the one with the best free run on rows held out",
-    None "none" "A linear model, where the data choose",
+    Auto "auto" "Of polynomials and networks the one with the best free run on held-out rows",
+    None "none" "A linear model",
 }}
 
 words! { of Membership {
@@ -234,15 +234,15 @@ words! { of Membership {
 
 words! { of Path {
     All "all" "Every combination of orders",
-    Alternate "alternate" "One order up at a time, each in its turn",
+    Alternate "alternate" "Increase one order at a time, in turn",
 }}
 
 words! { of Algorithm {
     LevenbergMarquardt "lm" "Levenberg and Marquardt",
-    GaussNewton "gauss-newton" "Gauss and Newton, the step halved until the cost falls",
+    GaussNewton "gauss-newton" "Gauss and Newton; the step is halved until the cost falls",
     Newton "newton" "Newton and Raphson with the full Hessian",
     Gradient "gradient" "Steepest descent",
-    Annealing "annealing" "Simulated annealing, then lm from the best point that it met",
+    Annealing "annealing" "Simulated annealing, then lm from the best point found",
 }}
 
 /// What is made small.
@@ -314,7 +314,7 @@ impl OptionText for StepOption {
     }
 }
 
-/// The samples that an input waits, or a range of them: they are no coefficients, of which there are so many at most.
+/// The delay of an input in samples, or a range of delays: unlike a number of coefficients it may be large.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DelayRange(pub OrderRange);
 

@@ -21,7 +21,7 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
         on.line(format!("log-likelihood {}", number(sum)));
     }
     if let Some(nis) = &summary.nis {
-        on.line(surprise(nis));
+        on.line(consistency(nis));
     }
     on.gap();
     for (title, estimates) in [("state", &summary.states), ("parameter", &summary.parameters)] {
@@ -50,7 +50,7 @@ fn table(on: &mut Sections, title: &str, estimates: &[EstimatedNumber]) {
 }
 
 /// How the normalised innovations squared lie.
-pub(super) fn surprise(nis: &NisSummary) -> String {
+pub(super) fn consistency(nis: &NisSummary) -> String {
     format!(
         "normalised innovation squared: mean {}, {} if the model is right; below its 95 % bounds {} %, above {} %, 2.5 % each if \
          it is right",

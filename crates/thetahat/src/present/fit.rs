@@ -69,7 +69,7 @@ pub fn fit_page(
     .write()
 }
 
-/// What the best models of a search make of rows held out.
+/// The free runs of the best models of a search on held-out rows.
 fn free_runs(on: &mut Sections, report: &Report, held_out: &[(String, Validated)]) {
     let Some((_, Validated { signals, .. })) = held_out.first() else { return };
     let runs = held_out
@@ -85,7 +85,7 @@ fn free_runs(on: &mut Sections, report: &Report, held_out: &[(String, Validated)
     let stack = Stack::new(&signals.time[rows.clone()], report.model.sample_time(), points(1 + runs.len()));
     on.section("Free runs");
     on.chart(|| charts::outputs(
-        "Free runs on rows held out",
+        "Free runs on held-out rows",
         "Measured output, and what the best models make of the inputs alone in the last third of the rows. Each was fitted to \
          the other two thirds for this picture.",
         stack.dated(&report.data.logs),

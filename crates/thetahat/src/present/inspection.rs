@@ -1,4 +1,4 @@
-//! Inspections: what a log is worth, before any fit.
+//! Inspections: checks of a log before a fit.
 
 use crate::data::{Finding, FindingKind};
 use crate::figures::{chance, fixed, number, seconds, short, three};
@@ -37,7 +37,7 @@ pub fn inspection(inspection: &Inspection, layout: Layout) -> String {
     super::text::written(on, layout)
 }
 
-/// The page of an inspection: what a log is worth, before any fit.
+/// The page of an inspection: the checks of a log before a fit.
 ///
 /// `signals` are the channels with their names, one value for each row; `time` is in seconds, one value for each row.
 pub fn inspection_page(

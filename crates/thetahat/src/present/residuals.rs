@@ -205,8 +205,8 @@ fn level(alpha: Option<f64>) -> String {
 
 fn stops(residuals: &Residuals) -> String {
     match residuals.anderson.stops_at {
-        Some(alpha) => format!("the fraction outside is below alpha up to alpha {}", fixed(alpha, 3)),
-        None => "the fraction outside is below alpha up to alpha 0.5 and beyond".to_owned(),
+        Some(alpha) => format!("white at levels up to {}", fixed(alpha, 3)),
+        None => "white at levels up to 0.5 and beyond".to_owned(),
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) fn selection(on: &mut Sections, report: &Report) {
     selection.steps.iter().for_each(|step| on.line(step));
     on.gap();
     if selection.failed > 0 && on.is_page() {
-        on.line(format!("Models that the data could not determine: {}.", selection.failed));
+        on.line(format!("Models skipped as not identifiable from this log: {}.", selection.failed));
     }
     on.chart(|| charts::search(selection));
     if !selection.delays.is_empty() {

@@ -121,7 +121,7 @@ fn steps(found: &StepTest, medium: Medium) -> Table {
         "from",
         "to",
         "before",
-        "regime",
+        "final",
         "noise",
         "rows as one",
         "misfit [%]",

@@ -108,7 +108,12 @@ pub(super) fn quantity(quantity: Quantity) -> String {
         if known == Interval::OPEN {
             return "not determined by this log".to_owned();
         }
-        return format!("{}, 95 % interval {}", number(quantity.value), interval(known));
+        return match known {
+            Interval { lower: Some(_), upper: Some(_) } => {
+                format!("{}, 95 % interval {}", number(quantity.value), interval(known))
+            }
+            _ => format!("{}, {} (95 %)", number(quantity.value), interval(known)),
+        };
     }
     let spread = quantity.standard_error.map_or_else(String::new, |spread| format!(" ± {}", error(spread)));
     format!("{}{spread}", number(quantity.value))

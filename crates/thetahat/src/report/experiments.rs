@@ -18,7 +18,7 @@ use crate::Error;
 use crate::data::{Detrend, Log, Offset, Record, Rows, Source, digests};
 use crate::estimate::{
     Answer, Ask, Beside, Constant, Distributed, ExperimentData, Fitted, Holders, Initial, LONG, Method,
-    Question, Task, enough, seen_by_starts,
+    Question, Task, enough, segments_of_starts,
 };
 use crate::model::{Orders, Structure};
 use crate::select::{Choice, Focus};
@@ -201,7 +201,7 @@ impl Experiments {
 
     /// Whether the fit asks for all rows, as there are few.
     pub fn are_fetched(&self) -> bool {
-        seen_by_starts(&self.segments()).is_none()
+        segments_of_starts(&self.segments()).is_none()
     }
 
     /// What is to be taken from each channel, the inputs first: its mean over all experiments, what is set by hand, or
@@ -331,7 +331,7 @@ impl Near {
             Some(*rows - holder.rows)
         });
         let firsts: Vec<usize> = firsts.collect();
-        let thin = seen_by_starts(&segments);
+        let thin = segments_of_starts(&segments);
         let is_all = thin.is_none();
         let wanted = thin.unwrap_or(segments);
         let mut asked = vec![Vec::new(); all.holders.len()];

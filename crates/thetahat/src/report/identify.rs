@@ -154,12 +154,12 @@ fn fit(
         None => log.record(&plan.inputs, &plan.output, rows),
     };
     let mut method = plan.method.clone();
-    let (mut selection, mut orders, guess) = match &plan.choice {
+    let (mut selection, mut orders, initial_parameters) = match &plan.choice {
         Choice::Known(orders) => (None, orders.clone(), None),
         Choice::Grid(_) | Choice::Automatic(_) => {
             let Chosen { found, with_constant, process, order, nonlinear } =
                 selected(&record, plan, &compared, &beside, &rivals, (sources, monitor))?;
-            let SelectedModel { selection, decisions: found, mut guess } = found;
+            let SelectedModel { selection, decisions: found, mut initial_parameters } = found;
             decisions.extend(found);
             if let Some((structure, test)) = process.zip(rivals.step_test) {
                 let report = test.fit(structure, selection, decisions, (sources, monitor))?;
@@ -174,10 +174,10 @@ fn fit(
                 return Ok((PendingEvaluation::done(report), log));
             }
             if let (Method::PredictionError(search), false) = (&mut method, with_constant) {
-                search.initial_parameters = guess.take();
+                search.initial_parameters = initial_parameters.take();
             }
             let orders = selection.chosen.orders.clone();
-            (Some(selection), orders, guess)
+            (Some(selection), orders, initial_parameters)
         }
     };
     plan.check_focus(&orders)?;
@@ -207,10 +207,10 @@ fn fit(
             let estimate = estimate::with_noise_integrator(&seen, &orders, &plan.inputs, search, monitor)?;
             Fitted::without_offset(estimate)
         }
-        _ => task.fit(plan.constant(), &beside, guess)?,
+        _ => task.fit(plan.constant(), &beside, initial_parameters)?,
     };
-    let behind = |selection: &&mut Selection| !drifts && plan.puts_noise_behind(selection);
-    if let Some(selection) = selection.as_mut().filter(behind) {
+    let wants_noise = |selection: &&mut Selection| !drifts && plan.estimates_noise_after_plant(selection);
+    if let Some(selection) = selection.as_mut().filter(wants_noise) {
         let order = estimate::noise_order(&seen, &orders, &fitted.estimate)?;
         if order > 0 {
             let Orders { nb, nf, nk, .. } = &orders;

@@ -286,7 +286,7 @@ pub(super) fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String
                 "grows without bound"
             };
             warnings.push(format!(
-                "{of}the free run on the estimation rows {what}: do not simulate with this model before you have looked at it"
+                "{of}the free run on the estimation rows {what}: check this run before you simulate with the model"
             ));
         }
         if let Some(training) = outcome.training.as_ref() {
@@ -319,7 +319,7 @@ pub(super) fn warnings(report: &Report, model: &NonlinearArxModel) -> Vec<String
             let of = if model.outputs.len() > 1 { format!("{}: ", fit.output) } else { String::new() };
             warnings.push(format!(
                 "{of}the free run on the estimation rows is no better than the mean of the output: take other lags, another map, or \
-                 validation rows that the choice looks at"
+                 validation rows that the choice evaluates"
             ));
         }
     }

@@ -30,15 +30,15 @@ const CLEARLY: f64 = 1.1;
 /// models of plants that saturate leave 1.1 times, within which a choice of terms prefers to stay.
 const RANGE: f64 = 2.0;
 
-/// A model that was tried.
-struct Tried {
+/// A model of the comparison.
+struct Candidate {
     /// None: the linear one.
     plan: Option<NonlinearArxPlan>,
     report: Report,
     step: TermStep,
 }
 
-/// What models are fitted to and judged on in the choice.
+/// The rows that models are fitted to, and those that they are evaluated on, in the choice.
 struct Parts<'l> {
     log: &'l Log,
     sources: &'l [Source],
@@ -159,7 +159,7 @@ fn best(
             plans.push(kind(plan.horizon()));
         }
     }
-    let (mut tried, mut refused): (Vec<Tried>, Option<Error>) = (linear.into_iter().collect(), None);
+    let (mut tried, mut refused): (Vec<Candidate>, Option<Error>) = (linear.into_iter().collect(), None);
     let mut untried = 0;
     for mut plan in plans {
         if for_all.is_over() && !tried.is_empty() {
@@ -173,15 +173,15 @@ fn best(
             Err(error) => refused = refused.or(Some(error)),
         }
     }
-    let rank = |one: &Tried| one.step.held_out.map_or((true, f64::INFINITY), RunFigures::rank);
+    let rank = |one: &Candidate| one.step.held_out.map_or((true, f64::INFINITY), RunFigures::rank);
     let better = |one: &(bool, f64), other: &(bool, f64)| one.0.cmp(&other.0).then(one.1.total_cmp(&other.1));
     let Some((strays, least)) = tried.iter().map(rank).min_by(better) else {
         return Err(refused.unwrap_or_else(|| Error::data("no model can be fitted to these rows")));
     };
-    let is_near = |one: &Tried| rank(one).0 == strays && rank(one).1 <= CLEARLY * least;
+    let is_near = |one: &Candidate| rank(one).0 == strays && rank(one).1 <= CLEARLY * least;
     let taken = tried.iter().position(is_near).unwrap_or(0);
     let path: Vec<TermStep> = tried.iter().map(|one| one.step.clone()).collect();
-    let Tried { plan: own, report, .. } = tried.swap_remove(taken);
+    let Candidate { plan: own, report, .. } = tried.swap_remove(taken);
     let mut report = match own {
         Some(mut own) => {
             own.search.time_limit = whole.left();
@@ -204,7 +204,7 @@ fn best(
             let mut report = identify_monitored(log.clone(), sources, &linear, monitor)?;
             if let Some(selection) = &mut report.selection {
                 selection.steps.push(
-                    "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on rows held out."
+                    "Polynomials and networks were tried as nonlinear ARX models: the error of none is clearly smaller on held-out rows."
                         .to_owned(),
                 );
             }
@@ -238,7 +238,7 @@ fn maps() -> impl Iterator<Item = MapPlan> {
 
 /// The plan with its lags, and where lags are chosen with those of the linear model too: as many past outputs as A or F
 /// reads, and of each input those of B and the one before them, as a nonlinear plant may answer sooner.
-fn lags(plan: &NonlinearArxPlan, linear: Option<&Tried>) -> Vec<NonlinearArxPlan> {
+fn lags(plan: &NonlinearArxPlan, linear: Option<&Candidate>) -> Vec<NonlinearArxPlan> {
     let own = NonlinearArxPlan { lags_chosen: false, ..plan.clone() };
     let mut plans = vec![own.clone()];
     // A step test may come to a process, which has no lags.
@@ -279,7 +279,7 @@ impl Parts<'_> {
     }
 
     /// The linear model; none where these rows determine none.
-    fn linear(&self, plan: &NonlinearArxPlan, limit: Option<Duration>) -> Result<Option<Tried>, Error> {
+    fn linear(&self, plan: &NonlinearArxPlan, limit: Option<Duration>) -> Result<Option<Candidate>, Error> {
         let own = Plan {
             estimate: self.estimation.clone(),
             validate: Vec::new(),
@@ -290,7 +290,7 @@ impl Parts<'_> {
             Ok(report) => {
                 let term = format!("linear: {}", report.model.name());
                 let parameters = report.model.parameters().len();
-                Ok(self.judged(None, report, (term, parameters), InitialCondition::Estimate))
+                Ok(self.evaluated(None, report, (term, parameters), InitialCondition::Estimate))
             }
             Err(Error::Undetermined { .. }) => Ok(None),
             Err(error) => Err(error),
@@ -298,7 +298,7 @@ impl Parts<'_> {
     }
 
     /// A nonlinear one; none where it has no run over the rows.
-    fn nonlinear(&self, plan: NonlinearArxPlan) -> Result<Option<Tried>, Error> {
+    fn nonlinear(&self, plan: NonlinearArxPlan) -> Result<Option<Candidate>, Error> {
         let own = NonlinearArxPlan {
             estimate: self.estimation.clone(),
             validate: self.held_out.clone(),
@@ -320,17 +320,17 @@ impl Parts<'_> {
             _ => last.term.clone(),
         };
         let row = (format!("{what}, of {} lags", model.regressors.len()), last.parameters);
-        Ok(self.judged(Some(plan), report, row, InitialCondition::Drop))
+        Ok(self.evaluated(Some(plan), report, row, InitialCondition::Drop))
     }
 
-    /// What the runs of a model over the rows say of it; none where it has none.
-    fn judged(
+    /// A model with the figures of its runs over the rows; none where it has none.
+    fn evaluated(
         &self,
         plan: Option<NonlinearArxPlan>,
         report: Report,
         (term, parameters): (String, usize),
         start: InitialCondition,
-    ) -> Option<Tried> {
+    ) -> Option<Candidate> {
         let driven = !report.model.inputs().is_empty();
         let (horizon, initial) = match driven {
             true => (Horizon::FreeRun, start),
@@ -368,6 +368,6 @@ impl Parts<'_> {
             free_run: Some(own),
             held_out: Some(fresh),
         };
-        Some(Tried { plan, report, step })
+        Some(Candidate { plan, report, step })
     }
 }

@@ -1,6 +1,6 @@
 //! One model from many pieces of the data.
 
-mod border;
+mod boundary;
 mod linear;
 mod nonlinear_arx;
 mod settings;
@@ -28,7 +28,7 @@ use crate::estimate::{SegmentStart, joint_products, joint_taps, lagged_products}
 use crate::respond::InitialCondition;
 use crate::validate::Fit;
 use crate::{Document, Error};
-use border::Border;
+use boundary::Boundary;
 use nonlinear_arx::{Centred, Products, Summed, summed};
 use settings::{Kind, Settings};
 
@@ -108,7 +108,7 @@ pub struct NormalEquations {
     time_gaps: usize,
     logs: Vec<Source>,
     digests: Vec<BTreeMap<String, String>>,
-    border: Border,
+    border: Boundary,
 }
 
 /// A part of the data, of which the first `past` rows are of the part before it.
@@ -355,7 +355,7 @@ impl NormalEquations {
                 .count(),
             logs: sources.to_vec(),
             digests: digests(log, &names, own)?,
-            border: Border::new(log, &names, past, settings.lags())?,
+            border: Boundary::new(log, &names, past, settings.lags())?,
             estimation: own.clone(),
             settings,
         })

@@ -83,8 +83,9 @@ impl Plan {
         if self.constant == Constant::Auto && given { Constant::No } else { self.constant }
     }
 
-    /// Whether the noise of a chosen model is found behind it: of one that simulates, without a description of its own.
-    pub(super) fn puts_noise_behind(&self, selection: &Selection) -> bool {
+    /// Whether the noise of a chosen model is estimated after the plant: that of an output-error model that was chosen
+    /// for its free run.
+    pub(super) fn estimates_noise_after_plant(&self, selection: &Selection) -> bool {
         let simulates = selection.winners.as_ref().is_some_and(|best| {
             selection.chosen.orders == best.simulation.orders
                 && best.simulation.orders != best.prediction.orders

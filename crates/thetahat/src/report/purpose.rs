@@ -16,7 +16,7 @@ const PREDICTS: f64 = 10.0;
 const SIMULATES: f64 = 50.0;
 /// A response is known where its magnitude is within this part of it, with a probability of 95 %.
 const KNOWN: f64 = 0.3;
-/// Frequencies that are looked at: so many, so far below the highest.
+/// The number of frequencies that are evaluated, and the ratio of the lowest to the highest.
 const FREQUENCIES: usize = 61;
 const BELOW: f64 = 1e-4;
 
@@ -98,7 +98,7 @@ fn figure(report: &Report, horizon: Horizon) -> Option<(f64, &'static str)> {
     held.or_else(on_blocks).or_else(|| Some((of(Part::Estimation)?, "on the rows of the fit")))
 }
 
-/// That of free runs on blocks held out while the model was chosen.
+/// The fit of free runs on the blocks that were held out while the model was chosen.
 fn held_out(report: &Report) -> Option<(f64, &'static str)> {
     let selection = report.selection.as_ref()?;
     let seen = if report.model.as_state_space().is_some() {

@@ -184,7 +184,7 @@ impl Requirement {
         self.demand.steps()
     }
 
-    /// Whether it can be asked of a model at all.
+    /// Whether the requirement applies to this model.
     ///
     /// # Errors
     /// [`Error::Argument`] for white residuals of a model that says nothing of the noise, for independence of inputs

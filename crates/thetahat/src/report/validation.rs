@@ -165,9 +165,9 @@ impl ValidationPlan {
     }
 }
 
-/// Says how a stored model does on a log: fits, what is left, and whether intervals hold.
+/// Validates a stored model on a log: its fits, tests of its residuals, and the coverage of its intervals.
 ///
-/// Every response starts as [`Model::natural_start`] has it. The model was fitted to rows of this log if these have the
+/// Every response starts from [`Model::natural_start`]. The model was fitted to rows of this log if these have the
 /// values that `data.digests` of the report says, bit for bit. Of a model of several logs each is recognised by itself.
 /// Cost: O(N (L + p)) for a polynomial model, O(N k p (n^3 + m n^2)) for one in equations that looks k steps ahead.
 ///

@@ -35,9 +35,9 @@ impl fmt::Display for Horizon {
 }
 
 impl InitialCondition {
-    /// What a response to measured data had better start from. Free runs, and predictions with C, D or F, of which the
-    /// filters have a memory: [`InitialCondition::Estimate`]. Other predictions, which need no more than a few measured
-    /// samples: [`InitialCondition::Drop`].
+    /// The default initial condition of a response to measured data. Free runs, and predictions with C, D or F, of
+    /// which the filters have a memory: [`InitialCondition::Estimate`]. Other predictions, which need no more than a
+    /// few measured samples: [`InitialCondition::Drop`].
     ///
     /// A log without the output leaves only [`InitialCondition::Zero`].
     pub fn natural(model: &PolynomialModel, horizon: Horizon) -> Self {

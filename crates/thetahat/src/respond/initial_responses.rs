@@ -7,9 +7,8 @@ use crate::Error;
 
 /// A response has died away when it is below this fraction of its largest value.
 const NEGLIGIBLE: f64 = 1e-20;
-/// An initial condition of which less than this fraction shows in the errors is not seen: what is left of it is
-/// rounding.
-pub(super) const UNSEEN: f64 = 1e-11;
+/// An initial condition of which less than this fraction is in the errors is not determined: its remainder is rounding.
+pub(super) const UNDETERMINED: f64 = 1e-11;
 
 /// A response until it has died away, or is not finite any more, or has `length` samples. `compute` gives its
 /// first samples; `order` is how many of them determine all that follow.

@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use thetahat_numerics::regression::{add_filtered, divide, sum_of_squares};
 
-use super::initial_responses::{Column, UNSEEN, closest_of, impulse_response, until_negligible};
+use super::initial_responses::{Column, UNDETERMINED, closest_of, impulse_response, until_negligible};
 use super::{InitialCondition, NOTHING_LEFT, are_worth, check_inputs, history};
 use crate::Error;
 use crate::data::{Record, measured};
@@ -342,7 +342,7 @@ pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basi
             values[gap.start.min(length)..gap.end.min(length)].fill(0.0);
         }
         let size = |values: &[f64]| values.iter().fold(0.0_f64, |size, value| size.hypot(*value));
-        let rounding = UNSEEN * (gain * size(&delayed)).max(size(&values));
+        let rounding = UNDETERMINED * (gain * size(&delayed)).max(size(&values));
         Column { values, rounding }
     };
     let mut columns: Vec<Column> = Vec::new();

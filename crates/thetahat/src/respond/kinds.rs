@@ -66,10 +66,10 @@ impl Model {
         }
     }
 
-    /// What a response to measured data had better start from: see [`InitialCondition::natural`]. Models in equations
-    /// know what their text says of their states in the first row of a log; free runs start from the state that
-    /// explains the outputs best, as state-space models do. Nonlinear ARX models start from measured samples, processes
-    /// at rest, as they were fitted.
+    /// The default initial condition of a response to measured data: see [`InitialCondition::natural`]. Predictions of
+    /// models in equations start from the states that their text gives for the first row of a log; free runs start from
+    /// the state that explains the outputs best, as state-space models do. Nonlinear ARX models start from measured
+    /// samples, processes at rest, as they were fitted.
     pub fn natural_start(&self, horizon: Horizon) -> InitialCondition {
         match self {
             Self::Polynomial(model) => InitialCondition::natural(model, horizon),

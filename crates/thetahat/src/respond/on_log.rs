@@ -22,7 +22,7 @@ pub(crate) trait OnLog: Sync {
     /// Whether inputs act on them.
     fn is_driven(&self) -> bool;
 
-    /// What a response had better start from.
+    /// The default initial condition of a response.
     fn natural_start(&self, horizon: Horizon) -> InitialCondition;
 
     /// What was measured of an output, as a deviation from its offset.
@@ -31,8 +31,8 @@ pub(crate) trait OnLog: Sync {
     /// The responses, as such deviations.
     fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error>;
 
-    /// The standard deviations of the errors of predictions, what is open of the parameters in them; NaN where there is
-    /// none.
+    /// The standard deviations of the errors of predictions, including the uncertainty of the parameters; NaN where
+    /// there is none.
     fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error>;
 
     /// The same of a free run from that start; none where nothing tells them.
@@ -48,7 +48,7 @@ pub(crate) trait OnLog: Sync {
     /// squared errors are of which `mse` is the mean.
     fn noise(&self, output: usize, mse: Option<f64>) -> (f64, Option<f64>);
 
-    /// What is left of each output one step ahead.
+    /// The one-step residuals of each output.
     fn tested(&self) -> Result<Vec<Tested<'_>>, Error>;
 
     /// What is expected after the last usable row of `rows`, at most this many steps ahead, and the row (0-based) that
@@ -81,7 +81,7 @@ pub(crate) struct PolynomialOnLog<'l> {
     /// What predictions are made from, and what they start from.
     ahead: Record<'l>,
     start: InitialCondition,
-    /// What is left one step ahead, once somebody asked.
+    /// The one-step residuals, computed when they are first needed.
     innovations: OnceLock<Vec<Innovations>>,
     /// What free runs are made from.
     free_run: Record<'l>,

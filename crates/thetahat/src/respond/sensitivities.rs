@@ -27,7 +27,7 @@
 //! Estimated impulses into 1/F have the covariance sigma^2 (Phi'Phi)^-1 of a regression; that counts in forecasts. On
 //! the samples they were estimated from errors are smaller for it, not larger, and nothing is added.
 //!
-//! The output's offset is an estimate as well. What is open of it is a constant k and a trend m on the right side of
+//! The output's offset is an estimate as well. Its uncertainty is a constant k and a trend m on the right side of
 //! the equation, two more inputs whose coefficients are zero and uncertain: their directions are among the l_i (see
 //! [`OffsetCovariance`](crate::model::OffsetCovariance)).
 //!
@@ -44,9 +44,9 @@ use crate::Error;
 use crate::data::Record;
 use crate::model::PolynomialModel;
 
-/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest cannot be
-/// told.
-const UNSEEN: f64 = 1e-20;
+/// A combination of initial conditions whose part of the Gram matrix is below this fraction of the largest is
+/// not determined.
+const UNDETERMINED: f64 = 1e-20;
 
 /// A change of the polynomials, in powers of q^-1 as these are; what is fixed in them does not change.
 #[derive(Debug)]
@@ -291,7 +291,7 @@ impl Paths {
         let Basis { first, counts, .. } = &self.basis;
         found
             .iter()
-            .filter(|(size, _)| size * size > UNSEEN * largest * largest)
+            .filter(|(size, _)| size * size > UNDETERMINED * largest * largest)
             .map(|(size, vector)| {
                 let each = vector.iter().zip(&scales);
                 let mut each = each.map(|(v, scale)| if *v == 0.0 { 0.0 } else { v / size / scale });

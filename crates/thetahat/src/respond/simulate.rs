@@ -4,7 +4,7 @@ use thetahat_numerics::regression::{add_filtered, divide, sum};
 
 use super::forecast::{Known, continuation};
 use super::initial_responses::{
-    Column, Delays, UNSEEN, closest, closest_of, impulse_response, until_negligible,
+    Column, Delays, UNDETERMINED, closest, closest_of, impulse_response, until_negligible,
 };
 use super::innovations::{Impulses, driven, residuals};
 use super::{InitialCondition, NOTHING_LEFT, Response, are_worth, check_inputs, history};
@@ -247,7 +247,7 @@ impl<'a> Free<'a> {
                         .zip(output)
                         .filter(|(_, y)| y.is_nan())
                         .for_each(|(value, _)| *value = 0.0);
-                    Column { values, rounding: UNSEEN * whole }
+                    Column { values, rounding: UNDETERMINED * whole }
                 })
             });
             let mut weights = closest_of(&target, &columns.collect::<Vec<_>>())?.into_iter();

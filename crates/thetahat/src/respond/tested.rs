@@ -7,7 +7,7 @@ use super::{Innovations, Regressors, Response};
 use crate::data::Record;
 use crate::model::{PolynomialModel, Signal};
 
-/// What is left of an output, and what its model says of it.
+/// The one-step residuals of an output, with what the tests need of its model.
 #[derive(Debug)]
 pub(crate) struct Tested<'a> {
     /// Its name.
@@ -20,31 +20,30 @@ pub(crate) struct Tested<'a> {
     pub(crate) model: Option<&'a dyn Regressors>,
 }
 
-/// An input of what is tested.
+/// An input of the model whose residuals are tested.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TestedInput<'a> {
     pub(crate) name: &'a str,
-    /// Which of the record's inputs it is.
+    /// Its position among the inputs of the record.
     pub(crate) place: usize,
-    /// How many lags of it the model has parameters for, delay included; 0 of an input that does not act in it.
-    pub(crate) reach: usize,
+    /// The number of its lags in the model, delay included; 0 for an input that does not act in the model.
+    pub(crate) lags: usize,
 }
 
 impl<'a> Tested<'a> {
-    /// What polynomials leave.
+    /// The residuals of a polynomial model.
     pub(crate) fn of_polynomials(
         model: &'a PolynomialModel,
         record: Record<'a>,
         innovations: &'a [Innovations],
     ) -> Self {
         let orders = &model.orders;
-        let reach = |input: usize| match orders.nb[input] {
+        let lags = |input: usize| match orders.nb[input] {
             0 => 0,
             nb => orders.nk[input] + orders.na + nb + orders.nf[input],
         };
         let inputs = model.inputs.iter().enumerate();
-        let inputs =
-            inputs.map(|(place, input)| TestedInput { name: &input.name, place, reach: reach(place) });
+        let inputs = inputs.map(|(place, input)| TestedInput { name: &input.name, place, lags: lags(place) });
         Self {
             output: &model.output.name,
             inputs: inputs.collect(),
@@ -62,7 +61,7 @@ impl<'a> Tested<'a> {
         innovations: Vec<Innovations>,
     ) -> Self {
         let inputs = inputs.iter().enumerate();
-        let inputs = inputs.map(|(place, input)| TestedInput { name: &input.name, place, reach: 1 });
+        let inputs = inputs.map(|(place, input)| TestedInput { name: &input.name, place, lags: 1 });
         Self {
             output: &output.name,
             inputs: inputs.collect(),

@@ -13,7 +13,7 @@ use super::ranking::ranked;
 use super::{Automatic, Delay, EXACT, Focus, SelectedModel, Selection, Task};
 use crate::Error;
 use crate::data::{Decision, FindingKind, Record};
-use crate::estimate::{Initial, pays, stretches};
+use crate::estimate::{Initial, pays, thinned_to};
 use crate::model::{Orders, Structure};
 use crate::validate::feedback::{Loop, feedback};
 
@@ -131,15 +131,15 @@ pub(super) fn choose(task: &Task<'_>, automatic: &Automatic) -> Result<SelectedM
     models.sort_by_key(Orders::parameters);
     let tried = models.clone();
     let outcome = compare(task, models, Some(&essential))?;
-    let SelectedModel { mut selection, guess, .. } = ranked(task, outcome, None)?;
+    let SelectedModel { mut selection, initial_parameters, .. } = ranked(task, outcome, None)?;
     selection.steps.extend(at_the_edge(&selection.chosen.orders, &tried));
     steps.append(&mut selection.steps);
-    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, guess })
+    Ok(SelectedModel { selection: Selection { steps, delays, ..selection }, decisions, initial_parameters })
 }
 
 /// What tells of a loop.
 fn loops(task: &Task<'_>) -> Loop {
-    let few = stretches(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
+    let few = thinned_to(task.estimation, SEGMENTS, SEGMENT).filter(|_| total(task.estimation) > LONG);
     let record = few.as_ref().unwrap_or(task.estimation);
     feedback(&record.inputs[..task.inputs.len()], record.output, &record.segments)
 }

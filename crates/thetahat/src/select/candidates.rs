@@ -34,7 +34,7 @@ pub(super) struct Trial {
 pub(super) struct Compared {
     pub(super) scored: Candidate,
     /// The parameters, if they were searched for.
-    pub(super) guess: Option<Vec<f64>>,
+    pub(super) initial_parameters: Option<Vec<f64>>,
     /// The largest modulus of a pole of the plant; infinite where that is not known.
     pub(super) radius: f64,
     /// The same of C.

@@ -12,11 +12,11 @@ use crate::model::{LARGEST, Orders, Structure};
 /// Which orders a model may have.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Choice {
-    /// These.
+    /// These orders.
     Known(Orders),
-    /// One of a grid's.
+    /// Orders chosen from a grid.
     Grid(Grid),
-    /// Whatever the data say.
+    /// Structure and orders decided from the data.
     Automatic(Automatic),
 }
 

@@ -96,7 +96,7 @@ pub(crate) fn choose(task: &Task<'_>, choice: &Choice) -> Result<SelectedModel, 
             format!("its record has {other} inputs, that of the estimation {inputs}"),
         ));
     }
-    // Who gives ranges asks for the criterion.
+    // With ranges of orders the criterion decides.
     let gated = matches!(choice, Choice::Automatic(_)) && inputs > 0;
     let focus = if task.focus == Focus::Auto && !gated { Focus::Prediction } else { task.focus };
     let may_drift = task.may_drift && gated;

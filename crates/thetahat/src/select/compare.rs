@@ -9,7 +9,7 @@ use super::search::Family;
 use super::{Candidate, EXACT, Select, Task, held_out, held_out_mse};
 use crate::Error;
 use crate::data::Record;
-use crate::estimate::{Common, Initial, Point, stretches};
+use crate::estimate::{Common, Initial, Point, thinned_to};
 use crate::model::Orders;
 
 /// Of records with more samples, models of which some need a search see segments only: this many, each so long.
@@ -139,7 +139,7 @@ pub(super) fn compare(
             let held_out_mse = if is_held_out { Some(held_out_mse?) } else { None };
             let radius = if with_blocks { held_out::radius(&orders, &parameters) } else { f64::INFINITY };
             let noise_radius = held_out::noise_radius(&orders, &parameters);
-            let guess = (!orders.is_linear()).then_some(parameters);
+            let initial_parameters = (!orders.is_linear()).then_some(parameters);
             let orders = task.named(&orders);
             let (held_out, parts) = held_out.unzip();
             let scored = Candidate {
@@ -151,7 +151,7 @@ pub(super) fn compare(
                 score,
                 orders,
             };
-            Some(Compared { scored, guess, radius, noise_radius, parts })
+            Some(Compared { scored, initial_parameters, radius, noise_radius, parts })
         },
     );
     let models: Vec<Compared> = models.collect();
@@ -174,7 +174,7 @@ fn thinned<'a>(task: &Task<'a>, sparing: bool) -> Option<Record<'a>> {
     let length = length.max(SHORTEST);
     let most = LONG.min(length.saturating_mul(SEGMENTS));
     let is_long = total(task.estimation) > most;
-    if is_long { stretches(task.estimation, SEGMENTS, length.min(SEGMENT)) } else { None }
+    if is_long { thinned_to(task.estimation, SEGMENTS, length.min(SEGMENT)) } else { None }
 }
 
 /// Leaves out the models whose searches take too long, but for the smallest of all; and what there is to say of that.
@@ -192,7 +192,7 @@ pub(super) fn keep_quick(task: &Task<'_>, models: &mut Vec<Orders>) -> Option<St
 /// The part of a record that blocks are held out of: of a long one segments of all there is.
 pub(crate) fn few_for_blocks<'a>(record: &Record<'a>, all: &Record<'a>) -> Record<'a> {
     let most = total(record) > MOST_IN_BLOCKS;
-    let few = if most { stretches(all, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
+    let few = if most { thinned_to(all, SEGMENTS_OF_BLOCKS, SEGMENT) } else { None };
     few.unwrap_or_else(|| record.clone())
 }
 

@@ -235,7 +235,7 @@ pub(crate) fn processes(
     });
     let mdl = |own: &ProcessCandidate| own.mdl.unwrap_or(f64::NEG_INFINITY);
     candidates.sort_by(|one, other| mdl(one).total_cmp(&mdl(other)));
-    let SelectedModel { mut selection, decisions, guess } = found;
+    let SelectedModel { mut selection, decisions, initial_parameters } = found;
     let mut taken = None;
     if let Some(best) = candidates.first() {
         let others: Vec<String> = candidates.iter().map(said).collect();
@@ -243,8 +243,11 @@ pub(crate) fn processes(
             "The inputs have few steps, so processes in continuous time compete, in free runs from rest on held-out blocks: {}.",
             others.join(", ")
         ));
-        let (is_taken, why) =
-            verdict(&selection, best, free_run(task, &selection.chosen.orders, guess.as_deref())?);
+        let (is_taken, why) = verdict(
+            &selection,
+            best,
+            free_run(task, &selection.chosen.orders, initial_parameters.as_deref())?,
+        );
         taken = is_taken.then_some(best.structure);
         selection.steps.push(if is_taken {
             format!("Taken instead: the process {}, as {why}.", best.structure)
@@ -253,7 +256,7 @@ pub(crate) fn processes(
         });
     }
     selection.processes = candidates;
-    Ok((SelectedModel { selection, decisions, guess }, taken))
+    Ok((SelectedModel { selection, decisions, initial_parameters }, taken))
 }
 
 fn said(candidate: &ProcessCandidate) -> String {
@@ -268,11 +271,15 @@ fn said(candidate: &ProcessCandidate) -> String {
 ///
 /// # Errors
 /// [`Error::Interrupted`].
-fn free_run(task: &Task<'_>, orders: &Orders, guess: Option<&[f64]>) -> Result<Option<f64>, Error> {
+fn free_run(
+    task: &Task<'_>,
+    orders: &Orders,
+    initial_parameters: Option<&[f64]>,
+) -> Result<Option<f64>, Error> {
     let orders = task.with_constants(orders);
     let square = |parameters: &[f64]| mean_square(&orders, parameters, task.estimation, Horizon::FreeRun);
-    if let Some(guess) = guess {
-        return Ok(square(guess));
+    if let Some(initial_parameters) = initial_parameters {
+        return Ok(square(initial_parameters));
     }
     // Of models without C, D and F nothing was kept.
     let method = Method::PredictionError(task.search.clone());

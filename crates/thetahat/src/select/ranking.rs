@@ -24,7 +24,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     let by_held_out_mse = task.select.is_held_out();
     let mut compared: Vec<&Compared> = compared.iter().collect();
     compared.sort_by(|a, b| better(&a.scored, &b.scored, by_held_out_mse));
-    // Who gives ranges asks for the criterion alone.
+    // With ranges of orders the criterion alone decides.
     let on_circle = |model: &&Compared| {
         path.is_none() && !is_exact(&model.scored, by_held_out_mse) && model.has_ended_on_circle()
     };
@@ -74,7 +74,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         ));
     }
     if failed > 0 {
-        steps.push(format!("The data could not determine {} more.", models(failed)));
+        steps.push(format!("{} skipped: not identifiable from this log.", models(failed)));
     }
     if last > 0 {
         steps.push(format!("Models whose C ended on the unit circle come last: {last}."));
@@ -88,8 +88,8 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
     if let Some(second) = second {
         steps.push(format!("Second: {}.", described(second, task.select)));
     }
-    let guess = compared.iter().find(|model| model.scored.orders == chosen.orders);
-    let guess = guess.and_then(|model| model.guess.clone());
+    let initial_parameters = compared.iter().find(|model| model.scored.orders == chosen.orders);
+    let initial_parameters = initial_parameters.and_then(|model| model.initial_parameters.clone());
     let selection = Selection {
         select: task.select,
         focus: task.focus,
@@ -114,7 +114,7 @@ pub(super) fn ranked(task: &Task<'_>, outcome: Outcome, path: Option<Path>) -> R
         processes: Vec::new(),
         state_space: None,
     };
-    Ok(SelectedModel { selection, decisions: Vec::new(), guess })
+    Ok(SelectedModel { selection, decisions: Vec::new(), initial_parameters })
 }
 
 /// Exact models first, the smallest of them first; then by score. Of equal ones the smaller, then the one that was made

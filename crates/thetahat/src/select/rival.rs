@@ -51,12 +51,12 @@ impl Selection {
     }
 
     /// Whether a model of another kind is better on blocks than all polynomial models.
-    pub(crate) fn is_behind(&self, other: &HeldOut) -> bool {
+    pub(crate) fn is_worse_than(&self, other: &HeldOut) -> bool {
         best_of_polynomials(self).is_some_and(|before| before > other.both())
     }
 
     /// Whether a model of another kind is far better on blocks than all polynomial models.
-    pub(crate) fn is_far_behind(&self, other: &HeldOut) -> bool {
+    pub(crate) fn is_far_worse_than(&self, other: &HeldOut) -> bool {
         best_of_polynomials(self).is_some_and(|before| before - other.both() > FAR)
     }
 }

@@ -34,7 +34,7 @@ pub struct Selection {
     pub samples: usize,
     /// How many models were compared.
     pub models: usize,
-    /// How many more the data could not determine.
+    /// The number of further models that were skipped, as this log cannot determine them.
     pub failed: usize,
     /// How many more were not fitted, as larger models with the same plant show that their MDL cannot be the least.
     #[serde(default, skip_serializing_if = "is_zero")]

@@ -69,7 +69,7 @@ pub(crate) fn states(
     found: SelectedModel,
     constant: Constant,
 ) -> Result<(SelectedModel, Option<usize>), Error> {
-    let SelectedModel { mut selection, decisions, guess } = found;
+    let SelectedModel { mut selection, decisions, initial_parameters } = found;
     let mut taken = None;
     if selection.has_rivals()
         && task.looks_further()
@@ -87,7 +87,7 @@ pub(crate) fn states(
         ));
         selection.state_space = Some(candidate);
     }
-    Ok((SelectedModel { selection, decisions, guess }, taken))
+    Ok((SelectedModel { selection, decisions, initial_parameters }, taken))
 }
 
 /// Whether the model is taken, and why.
@@ -95,7 +95,7 @@ fn verdict(candidate: &StateSpaceCandidate, is_fast: bool, selection: &Selection
     match &candidate.held_out {
         _ if !is_fast => (false, "it is unstable, or slower than the rows can show"),
         None => (false, "the rows without a block do not determine it"),
-        Some(seen) if selection.is_far_behind(seen) => (true, "no polynomial model comes near it"),
+        Some(seen) if selection.is_far_worse_than(seen) => (true, "no polynomial model comes near it"),
         Some(_) => (false, "it is not far better than polynomials"),
     }
 }

@@ -61,7 +61,7 @@ pub(crate) struct SelectedModel {
     pub(crate) decisions: Vec<Decision>,
     /// The parameters of the chosen model, with a constant and a trend where the records have them, if a search found
     /// them: a start for the search on all samples.
-    pub(crate) guess: Option<Vec<f64>>,
+    pub(crate) initial_parameters: Option<Vec<f64>>,
 }
 
 /// A sum of squared errors below this fraction of the output's is rounding: the model is exact.

@@ -40,11 +40,11 @@ pub(super) struct Line {
     /// In radians per sample.
     pub(super) angle: f64,
     /// What is there.
-    pub(super) found: Result<Found, Empty>,
+    pub(super) found: Result<LineEstimate, Empty>,
 }
 
-/// What a line tells.
-pub(super) struct Found {
+/// The estimate at one line of the spectrum.
+pub(super) struct LineEstimate {
     /// The first of the inputs that responses are from.
     pub(super) first: usize,
     /// From each input, or from one of them.
@@ -60,7 +60,7 @@ pub(super) struct Found {
     pub(super) coherence: Option<f64>,
 }
 
-impl Found {
+impl LineEstimate {
     /// The response from an input and the variance of its real part, where they are known.
     pub(super) fn of(&self, input: usize) -> Option<(Complex<f64>, Option<f64>)> {
         let at = input.checked_sub(self.first)?;
@@ -119,7 +119,7 @@ impl CrossSpectra {
         lines.map(|(line, &angle)| Line { angle, found: self.line(line, &largest, estimator) }).collect()
     }
 
-    fn line(&self, line: usize, largest: &[f64], estimator: Estimator) -> Result<Found, Empty> {
+    fn line(&self, line: usize, largest: &[f64], estimator: Estimator) -> Result<LineEstimate, Empty> {
         let inputs = self.channels - 1;
         let power = |j: usize| self.value(line, j, j).re;
         if let Some(empty) = (0..inputs).find(|&j| power(j) <= EMPTY * largest[j]) {
@@ -154,7 +154,7 @@ impl CrossSpectra {
             let inverse = factor.inverse();
             (0..inputs).map(|j| spread(&inverse, j)).collect()
         });
-        Ok(Found {
+        Ok(LineEstimate {
             first: 0,
             responses: scaled.iter().zip(&unit).map(|(g, unit)| g.unscale(*unit).scale(ratio)).collect(),
             variances,

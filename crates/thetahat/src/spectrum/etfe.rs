@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use thetahat_numerics::fourier::PairTransform;
 
-use super::estimate::{Bands, EMPTY, Empty, Estimate, Found, Line};
+use super::estimate::{Bands, EMPTY, Empty, Estimate, Line, LineEstimate};
 use super::plan::Method;
 use super::signals::Signals;
 use crate::Error;
@@ -34,7 +34,7 @@ pub(super) fn etfe(signals: &Signals, band: (f64, f64)) -> Result<Estimate, Erro
     let largest = lines.clone().map(|k| found.at(k).0.norm_sqr()).fold(0.0, f64::max);
     let line = |k: usize| {
         let (u, y) = found.at(k);
-        let ratio = Found {
+        let ratio = LineEstimate {
             first: 0,
             responses: vec![y / u],
             variances: None,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 use thetahat_numerics::fourier::PairTransform;
 
-use super::estimate::{Bands, EMPTY, Empty, Estimate, Found, Line};
+use super::estimate::{Bands, EMPTY, Empty, Estimate, Line, LineEstimate};
 use super::plan::Method;
 use super::signals::Signals;
 use crate::Error;
@@ -130,7 +130,7 @@ fn around(segment: &Segment, angle: f64) -> impl Iterator<Item = (isize, usize, 
 }
 
 /// The regression around one frequency. Each segment's transient is taken out of the other columns first.
-fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Result<Found, Empty> {
+fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Result<LineEstimate, Empty> {
     let inputs = largest.len();
     let columns = TERMS * inputs;
     let lines: Vec<Vec<(isize, usize, bool)>> =
@@ -204,7 +204,7 @@ fn local(segments: &[Segment], angle: f64, width: f64, largest: &[f64]) -> Resul
         0.5 * noise * (weights.norm_squared() + 2.0 * both.norm()) / (units[row] * units[row])
     };
     let whole = explained.re + noise;
-    Ok(Found {
+    Ok(LineEstimate {
         first: 0,
         variances: Some((0..inputs).map(variance).collect()),
         responses,

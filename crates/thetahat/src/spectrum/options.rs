@@ -95,13 +95,13 @@ options! {
     SpectrumOptions of "a frequency response" {
         /// Rows to use, 1-based and inclusive; each range is a segment of its own
         rows: Vec<Rows>, "A..B[,C..D]", "all", LOG;
-        /// What is taken from each channel first: none, mean, linear, start:K
+        /// What is subtracted from each channel first: none, mean, linear, start:K
         detrend: Option<Detrend>, "WHAT", "mean", LOG;
         /// Input columns; a name that holds a comma stands between double quotes, as in CSV
         input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS;
         /// Output column
         output: Option<ColumnName>, "NAME", "y", CHANNELS;
-        /// How the response is estimated
+        /// The estimation method
         method: Option<SpectrumMethod>, "METHOD", "lpm", METHOD;
         /// Frequencies in radians per second: a band, or for lpm and spa a list
         frequencies: Vec<FrequencyRange>, "LOW..HIGH|W[,W…]", "all that the log has", METHOD;
@@ -110,7 +110,7 @@ options! {
         /// For lpm: lines of the transform on either side of a frequency
         half_width: Option<usize>, "LINES", "12 for one input, 14 for two, …", METHOD, [LPM];
         /// For spa: lags of the Hann window
-        lags: Option<usize>, "M", "as many as leave the response as it is when they are doubled", METHOD, [SPA];
+        lags: Option<usize>, "M", "as many as do not change the response when they are doubled", METHOD, [SPA];
         /// For welch: rows of a window
         window: Option<usize>, "ROWS", "a power of two, about an eighth of the log", METHOD, [WELCH];
         /// For welch: which ratio of the spectra

@@ -11,7 +11,7 @@ use crate::document::document_methods;
 use crate::respond::FrequencyResponse;
 use crate::{Document, Error};
 
-/// The frequency response from each input to the output that a log shows, without a model. The JSON document
+/// The frequency response from each input to the output, estimated from a log without a model. The JSON document
 /// `thetahat.response/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasuredResponse {

@@ -3,7 +3,7 @@ use std::ops::Range;
 
 use thetahat_numerics::distribution::student_two_sided;
 
-use super::estimate::{Bands, Empty, Estimate, Found, Line};
+use super::estimate::{Bands, Empty, Estimate, Line, LineEstimate};
 use super::honesty::{self, Outside};
 use super::plan::{Method, SpectrumPlan};
 use super::response::{BandQuality, MeasuredResponse, NoisePoint};
@@ -117,7 +117,7 @@ fn document(
     let response = |(input, name): (usize, &String)| {
         let scale = unit / signals.units[input];
         let mut turned = 0.0;
-        let point = |(angle, found): (f64, &Found)| {
+        let point = |(angle, found): (f64, &LineEstimate)| {
             let (response, variance) = found.of(input)?;
             let variance = variance.map(|variance| variance * scale * scale).filter(|of| of.is_finite());
             let covariance = variance.map(|variance| [[variance, 0.0], [0.0, variance]]);
@@ -133,7 +133,7 @@ fn document(
             "the response leaves the range of numbers: give the channels in other units",
         ));
     }
-    let noise = |(angle, found): (f64, &Found)| NoisePoint {
+    let noise = |(angle, found): (f64, &LineEstimate)| NoisePoint {
         frequency: angle / sample_time,
         density: found
             .noise

@@ -6,7 +6,7 @@ use std::ops::Range;
 use thetahat_core::nalgebra::Complex;
 use thetahat_numerics::fourier::PairTransform;
 
-use super::estimate::{Bands, Estimate, Found, Line};
+use super::estimate::{Bands, Estimate, Line, LineEstimate};
 use super::periods::{Pieces, repeats};
 use super::plan::Method;
 use super::signals::Signals;
@@ -226,7 +226,7 @@ impl Periods {
             let explained = (response * u).norm_sqr();
             found.push(Line {
                 angle: angle(line),
-                found: Ok(Found {
+                found: Ok(LineEstimate {
                     first: input,
                     responses: vec![response],
                     variances: noise.map(|noise| vec![0.5 * noise / (count * u.norm_sqr())]),

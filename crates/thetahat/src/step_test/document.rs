@@ -62,9 +62,9 @@ pub struct Step {
 pub struct StepResponse {
     /// The output before the step: the mean over the rows at rest.
     pub initial: Quantity,
-    /// The output in the regime after it: the mean over `regime_rows`.
+    /// The output in the final steady state: the mean over `regime_rows`.
     pub regime: Quantity,
-    /// The rows that count as the regime.
+    /// The rows that count as the final steady state.
     pub regime_rows: Rows,
     /// The standard deviation of the noise, in units of the output.
     pub noise: f64,
@@ -161,7 +161,7 @@ impl FittedProcess {
     }
 }
 
-/// What is read off a response.
+/// A figure of a step response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepFigure {
@@ -173,9 +173,9 @@ pub enum StepFigure {
     TimeConstant,
     /// Seconds from 10 % to 90 % of the change.
     RiseTime,
-    /// Seconds after which the output stays within 2 % of the change around its regime.
+    /// Seconds after which the output stays within 2 % of the change around its final steady state.
     SettlingTime,
-    /// How far the first peak is above the regime, as a fraction of the change.
+    /// How far the first peak is above the final steady state, as a fraction of the change.
     Overshoot,
     /// Seconds to the first peak.
     PeakTime,
@@ -191,7 +191,7 @@ pub enum StepFigure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepMethod {
-    /// The levels before the step and in the regime.
+    /// The levels before the step and in the final steady state.
     Regime,
     /// Where the response leaves the band of the noise.
     NoiseBand,

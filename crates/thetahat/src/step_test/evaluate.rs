@@ -18,8 +18,8 @@ use crate::model::Quantity;
 const PARTS: [f64; 3] = [1.0, 0.5, 0.25];
 /// In more than the last of them it moves by no more than this fraction of the step: a longer part has to be worth it.
 const RESTS: f64 = 0.002;
-/// The regime is the last part of the rows after a step; of a response without overshoot all rows after this many rise
-/// times, which are six time constants of a first order.
+/// The final steady state is the last part of the rows after a step; of a response without overshoot all rows after
+/// this many rise times, which are six time constants of a first order.
 const LAST: f64 = 0.2;
 const OVER: f64 = 2.7;
 /// Fewer rows are no level and no response.
@@ -31,8 +31,8 @@ const MOVES: f64 = 0.015;
 const ERRORS: f64 = 3.0;
 /// A larger standard error, as a fraction of the step, is that of a transient rather than of noise.
 const KNOWN: f64 = 0.03;
-/// Nor has a response without overshoot reached its regime this many rise times after it began: three time constants of
-/// a first order, what noise lets one see or not.
+/// Nor has a response without overshoot reached its final steady state this many rise times after it began: three time
+/// constants of a first order, what noise lets one see or not.
 const UNFINISHED: f64 = 1.35;
 /// A change of the output is lost in noise below this many standard deviations of it, or this many of its own standard
 /// errors.
@@ -89,7 +89,7 @@ pub(super) fn evaluated(section: &Section, jump: &Jump) -> Result<(Step, Vec<Str
     Ok((step, words))
 }
 
-/// The output before a step and in the regime.
+/// The output before a step and in the final steady state.
 struct Levels {
     before: Range<usize>,
     regime: Range<usize>,
@@ -165,8 +165,8 @@ fn levels_of(section: &Section, jump: &Jump) -> Result<Levels, String> {
     let moved = moves(&regime);
     if !within(moved, MOVES) {
         return Err(format!(
-            "the output does not reach a regime: over the last {} rows it still moves by {} % of the change; hold the input longer, \
-             or fit a model, which needs no regime",
+            "the output does not reach a final steady state: over the last {} rows it still moves by {} % of the change; hold the \
+             input longer, or fit a model, which needs no steady state",
             regime.len(),
             percent(moved.0)
         ));
@@ -202,14 +202,14 @@ fn response(section: &Section, jump: &Jump, levels: Levels) -> Result<(StepRespo
     let begins = section.time[levels.regime.start] - start - first.begins;
     if first.shape != Shape::Underdamped && begins < UNFINISHED * first.rise {
         return Err(format!(
-            "the output does not reach a regime: it rises within {} s, and the last {} rows begin {} s after that began; hold the \
-             input longer, or fit a model, which needs no regime",
+            "the output does not reach a final steady state: it rises within {} s, and the last {} rows begin {} s after that \
+             began; hold the input longer, or fit a model, which needs no steady state",
             number(first.rise),
             levels.regime.len(),
             number(begins)
         ));
     }
-    // Of a response without overshoot more rows than the last ones may be the regime.
+    // In a response without overshoot more rows than the last ones may be in the final steady state.
     let over = start + first.begins + OVER * first.rise;
     let from = after.start + section.time[after.clone()].partition_point(|t| *t < over);
     let longer = first.shape != Shape::Underdamped && from < levels.regime.start;
@@ -341,8 +341,10 @@ fn read(time: &[f64], output: &[f64], levels: &Levels) -> Result<Read, String> {
     }
     match response.settles(levels.scale).filter(finite) {
         Some(settles) => figures.push((StepFigure::SettlingTime, StepMethod::Crossings, quantity(&settles))),
-        None => words
-            .push("noise hides when the output stays within 2 % of its regime: no settling time".to_owned()),
+        None => words.push(
+            "noise hides when the output stays within 2 % of its final steady state: no settling time"
+                .to_owned(),
+        ),
     }
     Ok(Read { shape, misfit, rise: levels.scale, begins, figures, words })
 }

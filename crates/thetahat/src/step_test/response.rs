@@ -1,4 +1,4 @@
-//! A response from 0 before the step to 1 in the regime, and what is read off its levels.
+//! A response from 0 before the step to 1 in the final steady state, and what is read off its levels.
 
 use super::influence::{Influence, Local};
 use super::noise::Noise;
@@ -31,7 +31,7 @@ pub(super) struct Response<'a> {
     pub(super) noise: &'a Noise,
     /// By what the noise has to be divided: the change of the output.
     pub(super) change: f64,
-    /// The variance of the level before and of the regime, in units of the noise.
+    /// The variance of the level before and of that in the final steady state, in units of the noise.
     pub(super) levels: [f64; 2],
 }
 
@@ -128,8 +128,8 @@ impl Response<'_> {
         Some((self.time[at], (step * step / 12.0 + noisy * noisy).sqrt()))
     }
 
-    /// After which time it stays within 2 % of the regime, by means over as few rows as show that; none if noise hides
-    /// it.
+    /// After which time it stays within 2 % of the final steady state, by means over as few rows as show that; none if
+    /// noise hides it.
     pub(super) fn settles(&self, rise: f64) -> Option<Influence> {
         let step = self.step(self.time[self.time.len() - 1]);
         let most = (WIDEST * rise / step) as usize;

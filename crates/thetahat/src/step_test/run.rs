@@ -39,19 +39,19 @@ impl StepTestPlan {
     }
 }
 
-/// Finds the steps of an input and reads off the response to each what a course does.
+/// Finds the steps of an input and reads the figures of a step test off the response to each.
 ///
 /// A step is a jump of the input from a level that it holds to another; noise on the input below the size of its steps
 /// does not matter. The clock may be irregular. The response is s = (y - y0)/(y1 - y0) with y0 the mean before and y1
-/// the mean of the regime. [`StepFigure`] and [`StepMethod`] list what is read off it, and how.
+/// the mean in the final steady state. [`StepFigure`] and [`StepMethod`] list what is read off it, and how.
 ///
-/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of what is left of
-/// the output at rest, before the step and in the regime, go through the derivatives of each figure by each row, and so
-/// do the errors of y0 and y1. They hold for the model that a way takes for granted; what a wrong one does they do not
-/// say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
+/// Standard errors are to first order in the noise: the standard deviation and the autocorrelation of the output about
+/// its mean at rest, before the step and in the final steady state, go through the derivatives of each figure by each
+/// row, and so do the errors of y0 and y1. They hold for the model that a way takes for granted; what a wrong one does
+/// they do not say, and [`StepResponse::misfit`](super::StepResponse::misfit) does.
 ///
 /// A step without a response that can be evaluated keeps its place, with the reason: the output is not at rest before
-/// it, the regime is not reached, the change is lost in the noise, rows are too few.
+/// it, the final steady state is not reached, the change is lost in the noise, rows are too few.
 ///
 /// Beside them stands the process with the least squared errors over all rows ([`FittedProcess`]): of first order with
 /// a dead time, or of second order, as the responses look.
@@ -312,7 +312,7 @@ fn nonlinear(steps: &[Step]) -> Option<String> {
     differ.then(|| {
         format!(
             "the gains of the steps differ by more than noise makes them ({} to {}): the plant is not linear over these levels, \
-             something else moved the output, or a regime was not quite reached",
+             something else moved the output, or a final steady state was not quite reached",
             short(least.0),
             short(largest.0)
         )
@@ -328,7 +328,7 @@ fn advice(steps: &[Step]) -> Vec<String> {
         (
             Shape::FirstOrder,
             "first order: trust the weighted t-bar; it counts each sample by how little noise turns it, while the plain mean is drawn up \
-             by samples near the regime, the tangent rests on a few rows, and 63.2 % on those around one level",
+             by samples near the final steady state, the tangent rests on a few rows, and 63.2 % on those around one level",
         ),
         (
             Shape::Overdamped,

@@ -10,7 +10,7 @@ use super::response::Response;
 /// Half of the rows of a parabola over a peak, as a fraction of the time from half of the change to the first peak:
 /// about a quarter of the half period.
 const OVER: f64 = 0.4;
-/// A peak is one if it is this many standard errors from the regime, and this fraction of the change.
+/// A peak is one if it is this many standard errors from the final steady state, and this fraction of the change.
 const ABOVE: f64 = 4.0;
 const LEAST: f64 = 0.005;
 /// The second peak lies in this part of a period around where it should.
@@ -18,7 +18,7 @@ const BESIDE: f64 = 0.3;
 /// Halvings of the interval in which a root is.
 const HALVINGS: usize = 50;
 
-/// A peak: how high it is, less the regime, and when.
+/// A peak: how far it is above the final steady state, and when.
 #[derive(Debug)]
 pub(super) struct Peak {
     pub(super) above: Influence,

@@ -20,7 +20,7 @@ const LINEAR: Kind = Kind::new("models of polynomials");
 const NARX: Kind = Kind::new("`narx`");
 /// What is taken of a report, and not of options.
 const OF_A_REPORT: [&str; 6] = ["model", "na", "nb", "nc", "nk", "narx"];
-/// Factors of a product, and lags, where nobody says.
+/// The default number of factors of a product, and of lags.
 const USUAL: usize = 2;
 
 /// The structure of a model that is tracked.
@@ -66,7 +66,7 @@ impl OptionText for Coupling {
 
     fn words() -> Vec<Word> {
         let word = |word, help| Word { word, alias: None, help };
-        vec![word("full", "Those of all"), word("none", "Its own")]
+        vec![word("full", "Those of all outputs"), word("none", "Its own")]
     }
 
     fn of(text: &str) -> Result<Self, String> {
@@ -118,25 +118,25 @@ options! {
         /// Values of each input that g reads, from `nk` on; one number for each input or one for all, 0 for a model
         /// without inputs
         nu: Vec<usize>, "N[,…]", "2", MODEL, [NARX];
-        /// Factors of a product at most
+        /// The largest number of factors of a product
         degree: Option<usize>, "D", "2", MODEL, [NARX];
-        /// Estimate a constant too, for channels of which the offsets are not known; without `offset` the first value
-        /// of each is taken off
+        /// Estimate a constant too, for channels whose offsets are not known; without `offset` the first value of each
+        /// is subtracted
         constant: bool, "", "", MODEL, [LINEAR];
-        /// How to estimate
+        /// The estimation method
         method: Option<TrackMethod>, "METHOD", "rls; with C rpem", ADAPTATION, [LINEAR];
-        /// What is forgotten, several side by side: FACTOR for exponential:FACTOR, or none, exponential:FACTOR,
+        /// The forgetting policy; several run in parallel: FACTOR for exponential:FACTOR, or none, exponential:FACTOR,
         /// selective:FACTOR, random-walk:VARIANCE, variable:FACTOR:MINIMUM:NOISE_VARIANCE
         forgetting: Vec<Policy>, "HOW[,HOW…]", "exponential:0.99", ADAPTATION;
-        /// How to start: standard (from a wide prior), exact (without prior, once the samples determine the
-        /// parameters), or mixed, mixed:SAMPLES (standard, then blended into exact)
+        /// The start of the recursion: standard (from a wide prior), exact (without prior, once the samples determine
+        /// the parameters), or mixed, mixed:SAMPLES (standard, then blended into exact)
         start: Option<TrackStart>, "HOW", "standard", ADAPTATION;
         /// Do not adapt where the innovation is smaller than this, in units of the output
         dead_zone: Option<f64>, "WIDTH", "0", ADAPTATION;
-        /// What becomes of rows whose innovations are far larger than the noise makes them: used; huber:THRESHOLD (one
-        /// of more than THRESHOLD standard deviations corrects as one of so many); gate:NIS:RELEASE (above NIS, the
-        /// square of that, it corrects nothing; after RELEASE in a row the next ones do). huber is huber:3, gate is
-        /// gate:25:20
+        /// The treatment of outliers, rows whose innovations are far larger than the noise: used; huber:THRESHOLD (an
+        /// innovation above THRESHOLD standard deviations counts as THRESHOLD of them); gate:NIS:RELEASE (a row whose
+        /// normalised innovation squared is above NIS is not used; after RELEASE such rows in a row the next ones are).
+        /// huber is huber:3, gate is gate:25:20
         outliers: Option<TrackOutliers>, "HOW", "used", ADAPTATION;
         /// Add to each row a forecast of the output this many rows later, inputs held at their last value
         horizon: Option<usize>, "T", "", WATCH;
@@ -161,7 +161,7 @@ struct Given<'o> {
 }
 
 impl TrackOptions {
-    /// Whether they make sense, whatever the channels; `warm`: a report says the model.
+    /// Checks the options, whatever the channels; `warm`: the model is that of a report.
     ///
     /// # Errors
     /// [`Error::Argument`] for options that do not go together, or are missing.

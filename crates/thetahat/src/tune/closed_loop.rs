@@ -22,7 +22,7 @@ const MOST_STEPS: f64 = 200_000.0;
 const KEPT: usize = 500;
 /// Frequencies of the sensitivity.
 const FREQUENCIES: usize = 4000;
-/// Half of 95 % of the normal distribution.
+/// The two-sided 95 % quantile of the normal distribution.
 const QUANTILE: f64 = 1.959964;
 
 /// The loop of a process with these parameters, of this covariance, and a controller Kc, Ti, Td.
@@ -95,7 +95,7 @@ fn directions(values: &[f64], spread: &[Vec<f64>]) -> Vec<Vec<f64>> {
     moves.iter().flat_map(|step| [moved(step, 1.0), moved(step, -1.0)]).collect()
 }
 
-/// How far a loop is from its border.
+/// How far a loop is from instability.
 struct Margins {
     peak: f64,
     gain: Option<f64>,

@@ -78,7 +78,7 @@ fn two_lags_take_a_derivative_and_the_half_rule() {
         near(*response.load_response.last().unwrap(), 0.0, 0.02);
         near(*response.controller_output.last().unwrap(), 0.5, 0.02);
     }
-    // A slower loop is further from its border.
+    // A slower loop is further from instability.
     let slow = tune(&process, &TuningPlan { closed_loop_time: Some(30.0), ..TuningPlan::default() }).unwrap();
     assert!(slow.settings[0].closed_loop.peak_sensitivity < found.settings[0].closed_loop.peak_sensitivity);
 }

@@ -1,4 +1,4 @@
-//! Whether what is left of a model holds nonlinear terms of an input.
+//! A test of whether the residuals of a model contain nonlinear terms of an input.
 //!
 //! Whiteness and independence are blind to them: with a symmetric input, u^2 correlates with no u, nor e with its own
 //! past. With v(t) = u(t)^2 less its mean and x = e, or e^2 less its mean, the statistic is

@@ -27,14 +27,14 @@ const MORE_LAGS: usize = 10;
 /// A sum of squared errors below this fraction of the output's is rounding.
 const NOTHING_LEFT: f64 = 1e-24;
 
-/// What is left of a log when a model has predicted it one step ahead: whether there is more to be had from it.
+/// The one-step residuals of a model on a log, with tests of whether they contain more than white noise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Residuals {
     /// The output.
     pub output: String,
     /// N, the residuals that count.
     pub samples: usize,
-    /// How many parameters the tests take as fitted to these samples: 0 on held-out data.
+    /// The number of parameters that the tests count as fitted to these samples: 0 on held-out data.
     pub fitted: usize,
     /// The autocorrelation at lags 0, 1, …, M; 1 at lag 0.
     pub autocorrelation: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct Residuals {
     pub ljung_box: Test,
     /// How many lags are outside their band, for several levels.
     pub anderson: Anderson,
-    /// Whether past inputs are still in the residuals, for each input with a B.
+    /// Whether the residuals depend on past inputs, for each input with a B.
     pub independence: Vec<Independence>,
 }
 
@@ -140,10 +140,10 @@ impl Residuals {
         }
 
         // As many lags as of the autocorrelation, and more than the plant has parameters after its delay.
-        let past_lags = |input: &TestedInput<'_>| lags.max(input.reach + MORE_LAGS).min(longest);
+        let past_lags = |input: &TestedInput<'_>| lags.max(input.lags + MORE_LAGS).min(longest);
         let inputs: Vec<(usize, &str, usize)> = inputs
             .iter()
-            .filter(|input| input.reach > 0)
+            .filter(|input| input.lags > 0)
             .map(|input| (input.place, input.name, past_lags(input)))
             .collect();
         let error = Taps { signal: Traces::ERROR, first: 1, count: lags, sign: 1.0 };

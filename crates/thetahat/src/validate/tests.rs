@@ -129,7 +129,7 @@ fn anderson_counts_lags_outside_their_bands() {
     // Bands at 3.29, 1.96, 0.99, 0.39 standard deviations.
     assert_eq!(outside, [0, 2, 3, 4]);
     let white: Vec<bool> = found.levels.iter().map(|level| level.white).collect();
-    // Two of four at 0.05 are a surprise; three of four at 0.32 are none.
+    // Two of four at 0.05 are significant; three of four at 0.32 are not.
     assert_eq!(white, [true, false, true, true]);
     // 3 standard deviations are outside from alpha = 0.0027 on.
     assert_eq!((found.lags, found.stops_at), (4, Some(0.003)));
@@ -143,7 +143,7 @@ fn anderson_counts_lags_outside_their_bands() {
     // Four times the variance, half as far outside.
     let found = anderson(&correlation, &(DMatrix::identity(4, 4) * 4.0), 4, &[0.05], 0.05);
     assert_eq!((found.levels[0].outside, found.stops_at), (0, Some(0.134)));
-    // One of four at 0.01 is a surprise at 0.05, not at 0.01.
+    // One of four at 0.01 is significant at 0.05, not at 0.01.
     let one = Autocorrelation { values: vec![0.3, 0.0, 0.0, 0.0], ..correlation.clone() };
     for (level, white) in [(0.05, false), (0.01, true)] {
         let found = anderson(&one, &DMatrix::identity(4, 4), 4, &[0.01], level);

@@ -38,7 +38,7 @@ pub struct AndersonLevel {
     pub band: f64,
     /// The lags outside of it; divided by all lags, the fraction that is expected to be alpha.
     pub outside: usize,
-    /// Whether as many outside are no surprise: whether `p_value` is not below the level of the validation.
+    /// Whether the count is consistent with white residuals: `p_value` is not below the level of the validation.
     pub white: bool,
     /// How often more are outside for white residuals, and half of how often as many are: the mid-p-value of the count,
     /// which is about binomial.

@@ -12,7 +12,7 @@ use thetahat::respond::{Horizon, InitialCondition, forecast, predict, prediction
 use super::{filtered, runs};
 use crate::simulated::Random;
 
-/// Half of 95 % of the normal distribution.
+/// The two-sided 95 % quantile of the normal distribution.
 const QUANTILE: f64 = 1.959964;
 
 struct Case {

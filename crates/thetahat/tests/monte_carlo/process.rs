@@ -11,7 +11,7 @@ use thetahat::thetahat_core::nalgebra::{DMatrix, DVector};
 use super::{Random, runs};
 
 const TRUTH: [f64; 3] = [2.0, 40.0, 6.3];
-/// Half of 95 % of the normal distribution.
+/// The two-sided 95 % quantile of the normal distribution.
 const QUANTILE: f64 = 1.959964;
 
 /// How often intervals hold each parameter of a first-order process with a dead time, in percent: those of any colour,

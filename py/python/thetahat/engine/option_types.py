@@ -16,47 +16,47 @@ class FitOptions(TypedDict, total=False):
     validate
         Rows to validate on
     detrend
-        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
-        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
-        mean]
+        What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the
+        first K rows); ``constant`` and ``trend`` estimate the remaining level and slope of the output
+        [default: mean]
     offset
         Set a channel's offset by hand
     prefilter
         Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through
-        one Butterworth filter; the model and its figures are of the signals as they are
+        the same Butterworth filter; the model and its figures are those of the unfiltered signals
     likelihood
-        Which likelihood to make large, given the first samples or of all of them: exact goes on through
-        missing outputs (models without D and F); ``"conditional"``: Given the samples that the first error
-        needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the Kalman filter
-        (ar, arma, arx, armax) [default: conditional]
+        The likelihood to maximise, conditional on the first samples or that of all samples (exact), which
+        continues through missing outputs (models without D and F); ``"conditional"``: Given the samples that
+        the first error needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the
+        Kalman filter (ar, arma, arx, armax) [default: conditional]
     initial
-        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
-        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
-        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
-        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
-        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+        The initial condition of each segment; ``"auto"``: drop without F; with F estimate if there are rows
+        before, or if it is worth its parameters, else zero; ``"drop"``: Measured samples before; without
+        them, samples without a full regressor are left out (models without F); ``"zero"``: Zeros;
+        ``"estimate"``: Measured samples before, and initial conditions estimated with the parameters (models
+        with F, processes, or ``likelihood`` exact with inputs) [default: auto]
     focus
         What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
-        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
-        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
-        inputs [default: auto]
+        inputs alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for
+        it has a clearly better free run on held-out rows; for networks and rbf-free simulation where there
+        are inputs [default: auto]
     constant
-        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
-        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
-        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
-        Never [default: auto]
+        Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
+        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
+        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
+        ``"no"``: Never [default: auto]
     trend
-        Estimate a slope of the output with the parameters too, and its level with it: for drift
+        Estimate a slope and the level of the output with the parameters: for drift
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     search
-        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
-        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
         ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
-        that it met [default: lm]
+        found [default: lm]
     max_iterations
-        Iterations at most, from each start [default: 100, with ``narx`` 500]
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
     tolerance
         Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
     step
@@ -64,21 +64,23 @@ class FitOptions(TypedDict, total=False):
     starts
         Search from this many further starts [default: 0, with ``narx`` 4]
     seed
-        Which random starts, or which random centres [default: 0]
+        The seed of random starts and of random centres [default: 0]
     time_limit
-        After so long begin no iteration, and look for no further start
+        After this time begin no iteration and no search from a further start
     norm
-        What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
-        rule; huber or huber:K, of squares up to K times the scale of the errors and of absolute values
-        beyond (K = 1.345 if not said); inf, the largest error [default: 2]
+        The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is
+        robust to outliers; huber or huber:K, squares up to K times the scale of the errors and absolute
+        values beyond (K = 1.345 by default); inf, the largest error [default: 2]
     bound
         Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     dc_gain
         Keep the static gain from an input in a range, or at a value
     ridge
-        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+        Ridge regression, which keeps parameters small: its weight, as a number of further samples with
+        output 0 [default: 0]
     noise_bound
-        Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+        A bound that no error may exceed, in units of the output; finds the box of all parameters that
+        satisfy it
     """
 
     estimate: Optional[Rows]
@@ -116,52 +118,54 @@ class ImpulseResponseOptions(TypedDict, total=False):
     validate
         Rows to validate on
     detrend
-        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
-        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
-        mean]
+        What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the
+        first K rows); ``constant`` and ``trend`` estimate the remaining level and slope of the output
+        [default: mean]
     offset
         Set a channel's offset by hand
     prefilter
         Fit in a band of frequencies in Hz, either end of which may be left out: inputs and output go through
-        one Butterworth filter; the model and its figures are of the signals as they are
+        the same Butterworth filter; the model and its figures are those of the unfiltered signals
     likelihood
-        Which likelihood to make large, given the first samples or of all of them: exact goes on through
-        missing outputs (models without D and F); ``"conditional"``: Given the samples that the first error
-        needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the Kalman filter
-        (ar, arma, arx, armax) [default: conditional]
+        The likelihood to maximise, conditional on the first samples or that of all samples (exact), which
+        continues through missing outputs (models without D and F); ``"conditional"``: Given the samples that
+        the first error needs: least squared prediction errors; ``"exact"``: Of all measured outputs, by the
+        Kalman filter (ar, arma, arx, armax) [default: conditional]
     initial
-        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
-        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
-        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
-        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
-        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+        The initial condition of each segment; ``"auto"``: drop without F; with F estimate if there are rows
+        before, or if it is worth its parameters, else zero; ``"drop"``: Measured samples before; without
+        them, samples without a full regressor are left out (models without F); ``"zero"``: Zeros;
+        ``"estimate"``: Measured samples before, and initial conditions estimated with the parameters (models
+        with F, processes, or ``likelihood`` exact with inputs) [default: auto]
     focus
         What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
-        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
-        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
-        inputs [default: auto]
+        inputs alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for
+        it has a clearly better free run on held-out rows; for networks and rbf-free simulation where there
+        are inputs [default: auto]
     constant
-        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
-        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
-        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
-        Never [default: auto]
+        Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
+        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
+        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
+        ``"no"``: Never [default: auto]
     trend
-        Estimate a slope of the output with the parameters too, and its level with it: for drift
+        Estimate a slope and the level of the output with the parameters: for drift
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     norm
-        What to make small: 2, the sum of squared errors; 1, of absolute ones, which wild samples do not
-        rule; huber or huber:K, of squares up to K times the scale of the errors and of absolute values
-        beyond (K = 1.345 if not said); inf, the largest error [default: 2]
+        The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is
+        robust to outliers; huber or huber:K, squares up to K times the scale of the errors and absolute
+        values beyond (K = 1.345 by default); inf, the largest error [default: 2]
     bound
         Keep a parameter in a range, either end of which may be left out, or at a value (a1=0.5)
     dc_gain
         Keep the static gain from an input in a range, or at a value
     ridge
-        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+        Ridge regression, which keeps parameters small: its weight, as a number of further samples with
+        output 0 [default: 0]
     noise_bound
-        Let no error exceed this, in units of the output, and find the box of all parameters that keep to it
+        A bound that no error may exceed, in units of the output; finds the box of all parameters that
+        satisfy it
     """
 
     estimate: Optional[Rows]
@@ -192,55 +196,55 @@ class StateSpaceOptions(TypedDict, total=False):
     validate
         Rows to validate on
     detrend
-        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
-        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
-        mean]
+        What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the
+        first K rows); ``constant`` and ``trend`` estimate the remaining level and slope of the output
+        [default: mean]
     offset
         Set a channel's offset by hand
     initial
-        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
-        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
-        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
-        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
-        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+        The initial condition of each segment; ``"auto"``: drop without F; with F estimate if there are rows
+        before, or if it is worth its parameters, else zero; ``"drop"``: Measured samples before; without
+        them, samples without a full regressor are left out (models without F); ``"zero"``: Zeros;
+        ``"estimate"``: Measured samples before, and initial conditions estimated with the parameters (models
+        with F, processes, or ``likelihood`` exact with inputs) [default: auto]
     focus
         What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
-        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
-        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
-        inputs [default: auto]
+        inputs alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for
+        it has a clearly better free run on held-out rows; for networks and rbf-free simulation where there
+        are inputs [default: auto]
     constant
-        Estimate the level of the output with the parameters, beside the mean that is taken off: for step
-        tests and other logs of which the mean is not where the plant rests; ``"auto"``: Where it lowers MDL,
-        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
-        Never [default: auto]
+        Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
+        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
+        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
+        ``"no"``: Never [default: auto]
     past
-        Past samples that the states are made of [default: those of the least AIC, 40 at most]
+        Past samples from which the states are computed [default: the number with the least AIC, 40 at most]
     future
-        Future samples that the states are to tell of [default: as many as past ones]
+        Future samples that the states predict [default: as many as past ones]
     weighting
-        Which subspace method: ssarx, right in closed loop too; or moesp, n4sid, cva, which project on future
-        inputs [default: ssarx]
+        The subspace method: ssarx, which is consistent in closed loop too; or moesp, n4sid, cva, which
+        project on future inputs [default: ssarx]
     feedthrough
         Whether inputs act on the outputs in the same sample [default: auto]
     refine
-        Search from there for the least errors one step ahead (prediction) or of the free run (simulation):
-        poles, gains and responses then have standard errors
+        Refine the model of the subspace method by a search for the least errors one step ahead (prediction)
+        or of the free run (simulation): poles, gains and responses then have standard errors
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     search
-        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
-        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
         ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
-        that it met [default: lm]
+        found [default: lm]
     max_iterations
-        Iterations at most, from each start [default: 100, with ``narx`` 500]
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
     tolerance
         Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
     step
         Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     time_limit
-        After so long begin no iteration, and look for no further start
+        After this time begin no iteration and no search from a further start
     """
 
     estimate: Optional[Rows]
@@ -275,23 +279,23 @@ class ProcessOptions(TypedDict, total=False):
     offset
         Set a channel's offset by hand
     initial
-        What stands before the first sample of a segment; ``"auto"``: drop without F; with F estimate where
-        rows stand before, or it is worth its parameters, else zero; ``"drop"``: What was measured before;
-        where nothing was, samples without a full regressor are left out (models without F); ``"zero"``:
-        Zeros; ``"estimate"``: What was measured before, and what fits best, found with the parameters
-        (models with F, processes, or ``likelihood`` exact with inputs) [default: auto]
+        The initial condition of each segment; ``"auto"``: drop without F; with F estimate if there are rows
+        before, or if it is worth its parameters, else zero; ``"drop"``: Measured samples before; without
+        them, samples without a full regressor are left out (models without F); ``"zero"``: Zeros;
+        ``"estimate"``: Measured samples before, and initial conditions estimated with the parameters (models
+        with F, processes, or ``likelihood`` exact with inputs) [default: auto]
     trend
-        Estimate a slope of the output with the parameters too, and its level with it: for drift
+        Estimate a slope and the level of the output with the parameters: for drift
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     search
-        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
-        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
         ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
-        that it met [default: lm]
+        found [default: lm]
     max_iterations
-        Iterations at most, from each start [default: 100, with ``narx`` 500]
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
     tolerance
         Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
     step
@@ -299,7 +303,7 @@ class ProcessOptions(TypedDict, total=False):
     starts
         Search from this many further starts [default: 0, with ``narx`` 4]
     time_limit
-        After so long begin no iteration, and look for no further start
+        After this time begin no iteration and no search from a further start
     """
 
     estimate: Optional[Rows]
@@ -326,29 +330,30 @@ class NarxOptions(TypedDict, total=False):
     validate
         Rows to validate on
     detrend
-        What to take from each channel before the fit: none, mean, linear, or start:K (the mean of the first
-        K rows); what is left of the output's level and slope ``constant`` and ``trend`` estimate [default:
-        mean]
+        What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the
+        first K rows); ``constant`` and ``trend`` estimate the remaining level and slope of the output
+        [default: mean]
     offset
         Set a channel's offset by hand
     focus
         What the model is for: prediction (errors one step ahead), simulation (free runs, driven by the
-        inputs alone), or a number of steps ahead. auto: prediction, unless without orders another model
-        simulates rows held out from it clearly better; of networks and rbf-free simulation where there are
-        inputs [default: auto]
+        inputs alone), or a number of steps ahead. auto: prediction; without orders simulation if a model for
+        it has a clearly better free run on held-out rows; for networks and rbf-free simulation where there
+        are inputs [default: auto]
     regressors
-        An expression of the channels that g reads too, such as 'sqrt(u)', at the lags of the channels in it;
-        once for each
+        A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in
+        it; may be repeated
     degree
-        Factors of a product at most (poly) [default: 2]
+        The largest number of factors of a product (poly) [default: 2]
     terms
-        How many functions to take; or products by name, as ``Model.parameter_names`` has them [default: as
-        ``select`` says, by the free run on validation rows, or on blocks of the estimation rows]
+        The number of functions in the model; or products by name, as ``Model.parameter_names`` has them
+        [default: as ``select`` says, by the free run on validation rows, or on blocks of the estimation
+        rows]
     most_terms
-        How many functions to look at [default: 40, and 10 local models]
+        How many functions to evaluate [default: 40, and 10 local models]
     centres
-        Where radial basis functions stand (rbf): chosen among the samples, at the means of N clusters, at a
-        grid of N in each direction, or at N pseudo-random points [default: chosen]
+        The centres of radial basis functions (rbf): chosen among the samples, at the means of N clusters, at
+        a grid of N in each direction, or at N pseudo-random points [default: chosen]
     width
         sigma of radial basis functions exp(-|z - centre|^2/sigma^2), z in standard deviations [default: so
         that neighbours overlap]
@@ -367,23 +372,23 @@ class NarxOptions(TypedDict, total=False):
         Draw the weights of the hidden layer of a network, and choose among its units (tanh, logistic, relu);
         else they are trained. Those of step are always drawn
     raw_terms
-        Leave signals in their own units: else each is divided by its standard deviation
+        Keep signals in their own units; without it each is divided by its standard deviation
     select
-        What makes one model better than another; ``"fpe"``: Akaike's final prediction error; ``"aic"``:
-        Akaike's information criterion; ``"aicc"``: The same, corrected for few samples; ``"mdl"``:
-        Rissanen's minimum description length; ``"hqc"``: Hannan and Quinn's criterion, between AIC and MDL;
-        ``"validation"``: The smallest model within 1 % of the least cost on the validation rows; ``"cv"``:
-        The same by cross-validation over five blocks in time [default: mdl]
+        The criterion of the choice; ``"fpe"``: Akaike's final prediction error; ``"aic"``: Akaike's
+        information criterion; ``"aicc"``: The same, corrected for few samples; ``"mdl"``: Rissanen's minimum
+        description length; ``"hqc"``: Hannan and Quinn's criterion, between AIC and MDL; ``"validation"``:
+        The smallest model within 1 % of the least cost on the validation rows; ``"cv"``: The same by
+        cross-validation over five blocks in time [default: mdl]
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     search
-        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
-        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
         ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
-        that it met [default: lm]
+        found [default: lm]
     max_iterations
-        Iterations at most, from each start [default: 100, with ``narx`` 500]
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
     tolerance
         Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
     step
@@ -391,11 +396,12 @@ class NarxOptions(TypedDict, total=False):
     starts
         Search from this many further starts [default: 0, with ``narx`` 4]
     seed
-        Which random starts, or which random centres [default: 0]
+        The seed of random starts and of random centres [default: 0]
     time_limit
-        After so long begin no iteration, and look for no further start
+        After this time begin no iteration and no search from a further start
     ridge
-        Keep parameters small: weighs like this many more samples in which the output is 0 [default: 0]
+        Ridge regression, which keeps parameters small: its weight, as a number of further samples with
+        output 0 [default: 0]
     """
 
     estimate: Optional[Rows]
@@ -437,14 +443,14 @@ class EquationsOptions(TypedDict, total=False):
         Rows to validate on
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
-        fitted again to the first two and evaluated on the third; 0 for a part that is not wanted
+        fitted again to the first two and evaluated on the third; 0 for no such part
     search
-        How steps are chosen; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton, the
-        step halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
         ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
-        that it met [default: lm]
+        found [default: lm]
     max_iterations
-        Iterations at most, from each start [default: 100, with ``narx`` 500]
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
     tolerance
         Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
     step
@@ -452,9 +458,9 @@ class EquationsOptions(TypedDict, total=False):
     starts
         Search from this many further starts [default: 0, with ``narx`` 4]
     seed
-        Which random starts, or which random centres [default: 0]
+        The seed of random starts and of random centres [default: 0]
     time_limit
-        After so long begin no iteration, and look for no further start
+        After this time begin no iteration and no search from a further start
     """
 
     estimate: Optional[Rows]
@@ -483,9 +489,9 @@ class ValidationOptions(TypedDict, total=False):
     lags
         Lags of the tests of residuals; short logs have fewer [default: 25]
     alpha
-        Reject where less than this chance is left [default: 0.05]
+        Significance level [default: 0.05]
     alphas
-        The levels of the bands of which Anderson's test counts what lies outside [default:
+        The levels of the bands of Anderson's test, which counts the correlations outside [default:
         0.01,0.02,0.05,0.1,0.2]
     """
 
@@ -505,12 +511,12 @@ class SpectrumOptions(TypedDict, total=False):
     rows
         Rows to use, 1-based and inclusive; each range is a segment of its own [default: all]
     detrend
-        What is taken from each channel first: none, mean, linear, start:K [default: mean]
+        What is subtracted from each channel first: none, mean, linear, start:K [default: mean]
     method
-        How the response is estimated; ``"lpm"``: Local polynomials for response and transient; ``"spa"``:
-        Blackman and Tukey: transforms of windowed covariances; ``"welch"``: Welch: averages over windows
-        that overlap by half; ``"etfe"``: The ratio of the transforms, unsmoothed; ``"sines"``: Correlation
-        over whole periods of a stepped or a multi-sine input [default: lpm]
+        The estimation method; ``"lpm"``: Local polynomials for response and transient; ``"spa"``: Blackman
+        and Tukey: transforms of windowed covariances; ``"welch"``: Welch: averages over windows that overlap
+        by half; ``"etfe"``: The ratio of the transforms, unsmoothed; ``"sines"``: Correlation over whole
+        periods of a stepped or a multi-sine input [default: lpm]
     frequencies
         Frequencies in radians per second: a band, or for lpm and spa a list [default: all that the log has]
     points
@@ -520,7 +526,7 @@ class SpectrumOptions(TypedDict, total=False):
         For lpm: lines of the transform on either side of a frequency [default: 12 for one input, 14 for two,
         …]
     lags
-        For spa: lags of the Hann window [default: as many as leave the response as it is when they are
+        For spa: lags of the Hann window [default: as many as do not change the response when they are
         doubled]
     window
         For welch: rows of a window [default: a power of two, about an eighth of the log]
@@ -568,11 +574,11 @@ class DesignOptions(TypedDict, total=False):
         Repeat the signal after this many samples [default: of prbs the longest that fits, of multisine 4096
         at most, else the length]
     channels
-        How many signals without correlation [default: 1, with ``model`` one for each input of the model]
+        The number of uncorrelated signals [default: 1, with ``model`` one for each input of the model]
     sample_time
         Seconds from one sample to the next [default: 1, with ``model`` that of the model]
     seed
-        Which random signal, or where a PRBS begins [default: 0]
+        The seed of random signals, or where a PRBS begins [default: 0]
     """
 
     length: Optional[int]

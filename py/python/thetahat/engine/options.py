@@ -53,7 +53,7 @@ class ReadOptions(TypedDict, total=False):
     skip_rows : int
         Lines to leave out below it; a line of units is recognised.
     missing : list of str
-        What stands for a missing value, besides nothing, NaN and what historians and spreadsheets write.
+        Further words for a missing value, besides empty fields, NaN and the words of historians and spreadsheets.
     values : dict of str to float
         Words that stand for numbers, such as {"auto": 1}, besides words for off and on.
     """

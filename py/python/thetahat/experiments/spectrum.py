@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class MeasuredResponse(Document):
-    """The frequency response that a log shows: the document of ``thetahat spectrum``.
+    """The frequency response estimated from a log: the document of ``thetahat spectrum``.
 
     Examples
     --------

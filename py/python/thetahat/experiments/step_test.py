@@ -109,7 +109,7 @@ class StepTest(Document):
 
 @_options.takes()
 def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: str | None = None) -> StepTest:
-    """Read off the responses to the steps of a log what a course does, with the standard error of each way.
+    """Read the figures of a step test off the responses to the steps of a log, each with its standard error.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def step_test(log: Log | MeasuredResponse, *, rows: Rows | None = None, input: s
     ValueError
         If there is no step.
     EstimationError
-        If no response can be evaluated: the regime is not reached, the output is not at rest before, the step is lost in the noise; or the
+        If no response can be evaluated: the final steady state is not reached, the output is not at rest before, the step is lost in the noise; or the
         phase does not pass -45 degrees.
 
     Examples

@@ -38,7 +38,7 @@ def compare(
     over: MeasuredResponse | None = None,
     **options: Unpack[ValidationOptions],
 ) -> Comparison:
-    """Put several fitted models side by side on a log.
+    """Compare several fitted models on a log.
 
     Parameters
     ----------

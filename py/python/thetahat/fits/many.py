@@ -247,7 +247,7 @@ def fit_many(
 ) -> Fits:
     """Fit each of many logs a model of its own.
 
-    A log with which it cannot be done is a row that says why. What comes out does not depend on the number of threads.
+    A log that fails gets a row with the reason. The results do not depend on the number of threads.
 
     Parameters
     ----------

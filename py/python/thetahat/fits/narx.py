@@ -33,8 +33,8 @@ def narx(
 ) -> Model:
     """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k).
 
-    The functions of g are chosen one by one, that which explains most of what is left comes next; or they are those of a network, or radial
-    basis functions, that are trained.
+    The functions of g are chosen one by one, each as the one that explains most of the remaining errors; or they are those of a network, or
+    radial basis functions, that are trained.
 
     Parameters
     ----------

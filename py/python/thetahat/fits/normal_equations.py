@@ -53,7 +53,7 @@ class NormalEquations:
     select : str, optional
         In place of terms: the information criterion that says how many, such as ``"mdl"``.
     degree, most_terms : int, optional
-        Of products that are chosen: factors at most, 2 unless it is said, and how many products are looked at, 40.
+        Of products that are chosen: factors at most, 2 unless it is said, and how many products are evaluated, 40.
     ny, nu : int, optional
         With terms: how many values of the output and of each input these read, 2 unless it is said.
     regressors : sequence of str, optional

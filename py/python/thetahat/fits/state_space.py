@@ -40,11 +40,12 @@ def ss(
     weighting : {"ssarx", "moesp", "n4sid", "cva"}, optional
         Which subspace method. All but the first project on future inputs, and are biased where inputs are fed back.
     past, future : int, optional
-        Past samples that the states are made of, those of the least AIC unless it is said, and future ones that they tell of: as many.
+        The number of past samples from which the states are computed, by default that of the least AIC, and the number of future samples
+        that they predict, by default as many.
     feedthrough : bool, optional
-        Whether inputs act on the outputs at once. Where it lowers MDL and the inputs are not fed back, unless it is said.
+        Whether inputs act on the outputs in the same sample. By default if that lowers MDL and there is no feedback to the inputs.
     refine : {"prediction", "simulation"}, optional
-        Search from there for the model of the least errors one step ahead, or of the free run. Poles, gains and responses then have
+        Refine the model by a search for the least errors one step ahead, or of the free run. Poles, gains and responses then have
         standard errors.
     search, max_iterations, tolerance, time_limit
         How to search, see `thetahat.FitOptions`.

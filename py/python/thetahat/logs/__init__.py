@@ -1,1 +1,1 @@
-"""Logs: the measured signals, how they are read, and what they are worth before any fit."""
+"""Logs: the measured signals, how they are read, and their checks before a fit."""

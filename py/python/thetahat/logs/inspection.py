@@ -1,4 +1,4 @@
-"""What a log is worth before any fit."""
+"""Checks of a log before a fit."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Finding:
 
 
 class Inspection(Document):
-    """What a log is worth before any fit: the document of ``thetahat inspect``.
+    """The checks of a log before a fit: the document of ``thetahat inspect``.
 
     Examples
     --------
@@ -139,7 +139,7 @@ def inspect(
     missing: str | Sequence[str] | None = None,
     values: Mapping[str, float] | None = None,
 ) -> Inspection:
-    """Inspect a log before any fit: its clock, the quality of its channels, excitation, delays and feedback.
+    """Check a log before a fit: its clock, the quality of its channels, excitation, delays and feedback.
 
     Parameters
     ----------

@@ -194,7 +194,7 @@ class Log:
 
     @classmethod
     def join(cls, logs: Sequence[Log]) -> Log:
-        """Several experiments with one plant as one log: nothing reaches from one into the next, see `experiments`.
+        """Several experiments with one plant as one log: lags do not cross from one into the next, see `experiments`.
 
         Parameters
         ----------

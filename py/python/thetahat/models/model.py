@@ -98,9 +98,9 @@ class Model(ConvertibleModel):
         horizon : int or None, default 1
             Steps ahead. None is a free run: the inputs alone drive the model.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
-            What stands before the first sample of a segment, in the words of the fits: nothing ("drop": measured samples
-            start the prediction, and the first ones have none), zeros, or what fits best. "auto" is "drop" where the
-            model needs no more, else "estimate"; "zero" where the log has no output.
+            The initial condition of each segment, in the words of the fits: measured samples ("drop": the first ones then
+            have no prediction), zeros, or an estimate. "auto" is "drop" for models that need only a few past samples,
+            else "estimate"; "zero" where the log has no output.
 
         Returns
         -------
@@ -162,7 +162,7 @@ class Model(ConvertibleModel):
         u : array_like, shape (N,) or (N, inputs), or data frame, dict of str to array_like, or Log
             The inputs. Those of a frame, dict or log are found by name.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
-            What stands before the first sample, as for `predict`. "auto" is "zero" for inputs alone, and "estimate" for a
+            The initial condition, as for `predict`. "auto" is "zero" for inputs alone, and "estimate" for a
             log with the output, as of ``thetahat simulate``.
         clamp : bool, default False
             Keep the outputs that a nonlinear ARX model feeds back within 1.1 times the range of the rows of its fit, and warn of how
@@ -215,8 +215,7 @@ class Model(ConvertibleModel):
         seed : int, default 0
             Which ones: the same seed gives the same runs.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
-            What stands before the first sample, as for `simulate`. From zero the noise starts at rest too; else it has run
-            before.
+            The initial condition, as for `simulate`. From zero the noise starts at rest too; else it is stationary.
 
         Returns
         -------

@@ -225,8 +225,8 @@ class StateFilter:
         How to estimate: "kalman" for a linear model, else "ekf", the extended Kalman filter, which estimates unknown parameters
         with the state. "luenberger" is an observer, with ``poles`` or ``gain``.
     initial : {"unknown", "zero"}, optional
-        Where a `Model` starts: anywhere, so that the first rows tell, which is the default; or at rest, its channels at their offsets.
-        Equations and matrices say so themselves.
+        The initial state of a `Model`: unknown, so that it is estimated from the first rows, which is the default; or at rest, with its
+        channels at their offsets. Equations and matrices have an initial state of their own.
     measurement_noise : float, or array_like of shape (m,), optional
         Standard deviation of white noise in what is measured, in units of each output, beside the noise of the `Model`, which drives
         the plant: for nonlinear ARX models, 0 unless it is said. The others say theirs.

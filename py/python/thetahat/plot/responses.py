@@ -192,7 +192,7 @@ def impulse(
 
 
 def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
-    """The responses of a step test, each from 0 before its step to 1 in the regime.
+    """The responses of a step test, each from 0 before its step to 1 in the final steady state.
 
     Parameters
     ----------

@@ -137,7 +137,7 @@ impl<T: Real, N: Dimension> ClosedLoop<T, N> {
         knows_gain: impl FnOnce() -> bool,
     ) -> T {
         let was_replaced = self.supervisor.replaced;
-        self.supervisor.judge(&self.settings.supervision, self.controller.is_some(), knows_gain);
+        self.supervisor.evaluate(&self.settings.supervision, self.controller.is_some(), knows_gain);
         let distrust = self.supervisor.distrust;
         if let Some(distrust) = distrust.filter(|_| self.supervisor.replaced) {
             if let Some(good) = self.supervisor.good_mut().filter(|_| !was_replaced) {

@@ -203,7 +203,7 @@ struct Model<'a, T> {
     c: &'a [T],
 }
 
-/// The frequencies that margins are looked at.
+/// The number of frequencies at which margins are evaluated.
 const FREQUENCIES: usize = 28;
 /// The candidates are tried again after so many designs of the same one.
 const TRY_ALL_AFTER: u16 = 25;

@@ -325,7 +325,7 @@ impl<T: Real, N: Dimension> Supervisor<T, N> {
     }
 
     /// The next sample begins: whether trust ends or comes back. `knows_gain` may be asked once.
-    pub(super) fn judge(
+    pub(super) fn evaluate(
         &mut self,
         supervision: &Supervision<T>,
         has_controller: bool,

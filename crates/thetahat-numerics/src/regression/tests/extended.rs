@@ -45,13 +45,13 @@ fn pieces_in_any_order_add_up_to_the_whole() {
     };
     let whole = ExtendedGram::of(&case.lagged());
     // A piece begins with the five rows that its first one reaches back to.
-    let borders = [0, 6, 7, 1000, 17_000, 17_004, length];
+    let boundaries = [0, 6, 7, 1000, 17_000, 17_004, length];
     let signals: Vec<&[f64]> = case.signals.iter().map(Vec::as_slice).collect();
     let piece = |pair: &[usize]| {
         let rows = pair[0].saturating_sub(5)..pair[1];
         ExtendedGram::of(&Lagged::new(&signals, case.taps.clone(), &[rows], Presample::Drop))
     };
-    let pieces: Vec<ExtendedGram> = borders.windows(2).map(piece).collect();
+    let pieces: Vec<ExtendedGram> = boundaries.windows(2).map(piece).collect();
     let mut orders = [vec![0, 1, 2, 3, 4, 5], vec![5, 3, 1, 0, 2, 4]];
     for order in &mut orders {
         let mut merged = pieces[order[0]].clone();

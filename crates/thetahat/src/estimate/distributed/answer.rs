@@ -9,7 +9,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::estimate::arx::rows;
 use crate::estimate::predictor::Predictor;
-use crate::estimate::stretches::energy;
+use crate::estimate::thinning::energy;
 use crate::estimate::uncertainty::{ErrorProducts, HIGHEST};
 use crate::model::{GreyBox, Orders};
 use crate::respond::equations::Experiment;

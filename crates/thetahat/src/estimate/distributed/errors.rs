@@ -8,10 +8,10 @@ use thetahat_numerics::optimize::Objective;
 
 use super::message::{AboutErrors, Asked, Factor, Found, ModelErrors, Point, Sums};
 use super::{Distributed, Holders};
-use crate::estimate::border::Border;
 use crate::estimate::experiment_data::PredictionErrors;
 use crate::estimate::polynomials::{Polynomials, Unusable};
 use crate::estimate::predictor::InitialCondition;
+use crate::estimate::stability_boundary::StabilityBoundary;
 use crate::estimate::uncertainty::{Autoregression, ErrorProducts, HIGHEST};
 use crate::model::Orders;
 
@@ -24,7 +24,7 @@ pub(crate) struct DistributedErrors<'e> {
     conditions: Vec<Vec<usize>>,
     polynomials: Polynomials,
     stability: Vec<f64>,
-    border: Border,
+    stability_boundary: StabilityBoundary,
     /// Where the errors were evaluated last, and what the holders said.
     parameters: Vec<f64>,
     evaluated: Vec<Vec<f64>>,
@@ -55,7 +55,7 @@ impl<'e> DistributedErrors<'e> {
             samples: samples.iter().sum(),
             polynomials: Polynomials::new(orders, &vec![0.0; parameters]),
             stability: Vec::new(),
-            border: Border::new(orders, false),
+            stability_boundary: StabilityBoundary::new(orders, false),
             parameters: vec![0.0; parameters],
             evaluated: zeros.clone(),
             last: Vec::new(),
@@ -185,7 +185,7 @@ impl Objective for DistributedErrors<'_> {
     }
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        self.border.draw_in(from, trial)
+        self.stability_boundary.draw_in(from, trial)
     }
 }
 

@@ -166,10 +166,10 @@ impl Likelihood for LikelihoodObjective<'_> {
                         by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);
                     }
                     self.slopes.squares += error * error / variance;
-                    let surprise = (1.0 - error * error / variance) / (2.0 * variance);
+                    let variance_weight = (1.0 - error * error / variance) / (2.0 * variance);
                     for i in 0..size {
                         let (e, s) = (self.error_slopes[i], self.variance_slopes[i]);
-                        self.slopes.gradient[i] += error * e / variance + surprise * s;
+                        self.slopes.gradient[i] += error * e / variance + variance_weight * s;
                         let (by_error, by_variance) = (e / variance, s / (2.0 * variance * variance));
                         for j in 0..=i {
                             self.slopes.information[i * size + j] +=

@@ -9,8 +9,8 @@ use thetahat_numerics::regression::{condition, divide, divide_from};
 use super::kalman::{Filter, Process};
 use crate::data::Record;
 use crate::estimate::{
-    border::Border,
     polynomials::{Polynomials, Unusable},
+    stability_boundary::StabilityBoundary,
 };
 use crate::model::{Orders, polynomial::is_stable};
 
@@ -91,7 +91,7 @@ pub(super) struct Likelihood<'a> {
     matrix: Vec<f64>,
     right: Vec<f64>,
     scratch: Vec<f64>,
-    border: Border,
+    stability_boundary: StabilityBoundary,
 }
 
 impl<'a> Likelihood<'a> {
@@ -133,7 +133,7 @@ impl<'a> Likelihood<'a> {
             matrix: vec![0.0; parameters * parameters],
             right: vec![0.0; parameters],
             scratch: Vec::new(),
-            border: Border::new(orders, true),
+            stability_boundary: StabilityBoundary::new(orders, true),
         }
     }
 
@@ -428,6 +428,6 @@ impl Objective for Likelihood<'_> {
     }
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        self.border.draw_in(from, trial)
+        self.stability_boundary.draw_in(from, trial)
     }
 }

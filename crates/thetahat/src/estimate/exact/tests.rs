@@ -329,7 +329,7 @@ fn the_gradient_is_that_of_differences() {
 
 #[test]
 fn standard_errors_are_as_large_as_the_errors() {
-    let (runs, mut squares, mut at_the_border) = (100, [0.0; 5], 0);
+    let (runs, mut squares, mut at_the_boundary) = (100, [0.0; 5], 0);
     for seed in 0..runs {
         let experiment = Experiment::new(250, 100 + seed);
         let record = experiment.record(0);
@@ -345,7 +345,7 @@ fn standard_errors_are_as_large_as_the_errors() {
             assert!(found.search.stability_bound);
             let difference = other.log_likelihood.unwrap() - found.log_likelihood.unwrap();
             assert!(difference.abs() < 1e-5, "{seed}: {difference}");
-            at_the_border += 1;
+            at_the_boundary += 1;
             continue;
         };
         for (place, square) in squares.iter_mut().enumerate() {
@@ -353,7 +353,7 @@ fn standard_errors_are_as_large_as_the_errors() {
             *square += error * error / covariance[place][place] / runs as f64;
         }
     }
-    assert!(at_the_border <= 6, "{at_the_border}");
+    assert!(at_the_boundary <= 6, "{at_the_boundary}");
     // chi-square of 100 degrees over 100 has a deviation of 0.14.
     assert!(squares.iter().all(|square| (0.6..1.5).contains(square)), "{squares:?}");
 }

@@ -1,4 +1,4 @@
-//! What a choice of functions looked at, and what its models miss.
+//! The functions that a choice evaluated, and the errors of its models.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -95,8 +95,8 @@ pub struct TermStep {
     /// come.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub free_run: Option<RunFigures>,
-    /// The free run on the rows that the choice looked at, where there are some; one step ahead where there are no
-    /// inputs.
+    /// The free run on the rows that the choice evaluated models on, where there are some; one step ahead where there
+    /// are no inputs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<RunFigures>,
 }

@@ -120,7 +120,7 @@ impl Samples<'_> {
             return Err(Error::undetermined(
                 Vec::new(),
                 format!(
-                    "{samples} samples are too few: each fifth of them is judged by the others; ask fewer `units`, or name more rows"
+                    "{samples} samples are too few: each fifth of them is predicted from the others; give fewer `units`, or more rows"
                 ),
             ));
         }

@@ -1,7 +1,7 @@
 //! Estimates with and without a constant from normal equations alone, in twice the precision: the rows are gone.
 //!
-//! A column of ones is among those whose products were summed, so that the constant, what it is worth, and what is open
-//! of an offset that was taken before follow as they do from a record.
+//! A column of ones is among those whose products were summed, so that the constant, what it is worth, and the
+//! uncertainty of an offset that was subtracted before the fit follow as they do from a record.
 
 use thetahat_numerics::regression::{Column, ExtendedGram};
 

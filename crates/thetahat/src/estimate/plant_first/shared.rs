@@ -14,14 +14,14 @@ use thetahat_numerics::optimize::{
 use thetahat_numerics::regression::Folding;
 
 use super::super::arx::{arx, rows};
-use super::super::border::Border;
 use super::super::instrumental::instrumental_variables;
 use super::super::outcome::{StartOutcome, search_outcome};
 use super::super::polynomials::Unusable;
 use super::super::prediction_error::{TWIN, flat, prediction_error, root_of};
 use super::super::predictor::{InitialCondition, Predictor};
 use super::super::reflection;
-use super::super::stretches::{energy, filled};
+use super::super::stability_boundary::StabilityBoundary;
+use super::super::thinning::{energy, filled};
 use super::super::uncertainty::{coloured, restricted};
 use super::super::{Estimate, Initial, Procedure, drop_is_not_for_f};
 use crate::Error;
@@ -46,7 +46,7 @@ struct Shared<'r> {
     moved: Vec<f64>,
     matrix: Vec<f64>,
     right: Vec<f64>,
-    border: Border,
+    stability_boundary: StabilityBoundary,
     /// Memory for the triangle of psi of theta, and of psi S.
     triangle: Vec<f64>,
     folding: Folding,
@@ -62,7 +62,7 @@ impl<'r> Shared<'r> {
         let (count, size) = (na + b, own.len());
         Self {
             predictor: Predictor::with_one_denominator(record, plant, begin),
-            border: Border::new(&orders, true),
+            stability_boundary: StabilityBoundary::new(&orders, true),
             orders,
             theta: vec![0.0; size],
             moved: vec![0.0; size],
@@ -188,7 +188,7 @@ impl Objective for Shared<'_> {
     }
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        self.border.draw_in(from, trial)
+        self.stability_boundary.draw_in(from, trial)
     }
 }
 
@@ -208,7 +208,7 @@ pub(super) fn plant(
         let mut best: Option<Reached<'_>> = None;
         let mut outcomes = Vec::new();
         let mut winner = 0;
-        // Each is followed in the coordinates without a border too, unless another algorithm is asked for.
+        // Each is followed in the coordinates without a boundary too, unless another algorithm is asked for.
         let turned = options.algorithm == Algorithm::LevenbergMarquardt;
         let turned = [false, true].into_iter().take(1 + usize::from(turned));
         let each =
@@ -298,7 +298,7 @@ fn starts(
     let count = linear.parameters();
     let mut starts = Vec::new();
     if let Some(initial) = options.initial_parameters.as_ref().filter(|initial| initial.len() >= count) {
-        starts.push(("guess", initial.clone()));
+        starts.push(("initial-parameters", initial.clone()));
     }
     let found = filled(record, |record| -> Result<_, Error> {
         let search = Search { plant_first: false, initial_parameters: None, ..options.clone() };
@@ -358,7 +358,7 @@ fn finish(
         root_of(&LeastSquares::from_factor(&triangle, &zeros, 0.0, samples).ok()?)
     });
     let Some((root, condition)) = root else { return Err(flat(orders, &found.parameters)) };
-    let (residuals, segments) = predictor.stretches();
+    let (residuals, segments) = predictor.residuals_by_section();
     let sensitivities = || {
         let all = predictor.sensitivities();
         let mut own = vec![vec![0.0; residuals.len()]; shared.right.len()];

@@ -18,7 +18,7 @@ use crate::estimate::{
     polynomials::extended,
     predictor::InitialCondition,
     start::{Plants, candidates},
-    stretches::{Packed, filled, stretches},
+    thinning::{Packed, filled, thinned_to},
 };
 use crate::model::Orders;
 
@@ -131,7 +131,7 @@ impl Job<'_> {
 
 /// Segments of a longer record: enough to see where searches lead.
 pub(super) fn thinned(record: &Record<'_>) -> Option<Packed> {
-    let few = if is_long(record) { stretches(record, SEGMENTS, LONG / SEGMENTS) } else { None };
+    let few = if is_long(record) { thinned_to(record, SEGMENTS, LONG / SEGMENTS) } else { None };
     few.map(|record| Packed::of(&record))
 }
 

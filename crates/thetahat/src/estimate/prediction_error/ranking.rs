@@ -18,7 +18,7 @@ use crate::estimate::outcome::StartOutcome;
 use crate::estimate::predictor::InitialCondition;
 use crate::estimate::restart::restarts;
 use crate::estimate::start::candidates;
-use crate::estimate::stretches::filled;
+use crate::estimate::thinning::filled;
 use crate::model::Orders;
 
 /// Starts of which the costs differ by more than this fraction of the lowest may lead to different minima.

@@ -357,7 +357,7 @@ fn white_errors_of_a_long_record_end_the_comparison_of_starts() {
 
 /// The plant's pole is on the unit circle: a search comes to the boundary, and goes on along it.
 #[test]
-fn a_search_goes_on_along_the_border_of_stability() {
+fn a_search_goes_on_along_the_boundary_of_stability() {
     let mut noise = Noise(11);
     let (u, e) = (noise.take(600), noise.take(600));
     let x = filtered(&[0.0, 1.0, 0.5], &[1.0, -1.6, 0.6], &u);

@@ -105,6 +105,6 @@ impl Objective for Predictor<'_> {
     }
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        self.border.draw_in(from, trial)
+        self.stability_boundary.draw_in(from, trial)
     }
 }

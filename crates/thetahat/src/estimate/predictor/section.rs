@@ -12,8 +12,8 @@ use super::{Column, Layout, loss};
 use crate::data::Record;
 use crate::estimate::polynomials::Polynomials;
 
-/// The fraction of a initial-condition response, squared, below which what is left of it is rounding.
-const UNSEEN: f64 = 1e-22;
+/// The fraction of an initial-condition response, squared, below which its remainder is rounding.
+const RESPONSE_ROUNDING: f64 = 1e-22;
 /// The fraction of its largest value below which a response has died away.
 const NEGLIGIBLE: f64 = 1e-20;
 /// Samples of a response that are computed at first.
@@ -182,7 +182,7 @@ impl<'a> Section<'a> {
                 known = (4 * known).min(length);
             };
             self.faded_lengths[own..own + count].fill(known);
-            self.free_floors[own..own + count].fill(UNSEEN * gain * gain * size);
+            self.free_floors[own..own + count].fill(RESPONSE_ROUNDING * gain * gain * size);
             own += count;
         }
         let counted = |column: usize, known: usize| &self.faded[column * length..][layout.counted..known];
@@ -315,7 +315,7 @@ impl<'a> Section<'a> {
                 let size = self.respond(layout, polynomials, layout.frees[j], Some(j));
                 let own = next..next + layout.own_free[j];
                 next = own.end;
-                self.free_floors[own].fill(UNSEEN * gain * gain * size);
+                self.free_floors[own].fill(RESPONSE_ROUNDING * gain * gain * size);
             }
         }
         if layout.uses(layout.impulse) {

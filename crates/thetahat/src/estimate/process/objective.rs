@@ -535,8 +535,9 @@ impl<'a> ProcessObjective<'a> {
         1.0 - sum_of_squares(&left) / sum_of_squares(&self.residuals)
     }
 
-    /// Residuals and some columns on all rows of each stretch that counts, where no output was measured NaN and zero;
-    /// the columns of each stretch, and where it stands among the residuals.
+    /// The residuals and the columns `used` on all rows of each segment that counts; where no output was measured the
+    /// residual is NaN and the columns are zero. Gives the residuals, the columns of each segment, and the range of
+    /// each segment among the residuals.
     #[expect(clippy::type_complexity, reason = "three lists of one thing each")]
     pub(super) fn by_segments(
         &self,
@@ -638,7 +639,7 @@ impl Objective for ProcessObjective<'_> {
         for (((column, right), value), [low, high]) in
             columns.iter_mut().zip(&mut self.right).zip(&self.point).zip(limits)
         {
-            // It would leave through the border that it stands on.
+            // It would leave through the bound that it stands on.
             if *value <= low && *right < 0.0 || *value >= high && *right > 0.0 {
                 column.fill(0.0);
                 *right = 0.0;
@@ -661,7 +662,7 @@ impl Objective for ProcessObjective<'_> {
         *refusal == Refusal::Outside
     }
 
-    /// Onto the border. What wants to leave there stays from then on, see `linearize`.
+    /// Moves parameters onto the bound that they would cross. They stay there from then on, see `linearize`.
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
         for (value, [low, high]) in trial.iter_mut().zip(self.limits()) {
             *value = value.clamp(low, high);

@@ -30,7 +30,7 @@ use thetahat_numerics::regression::{Span, product, sum_of_squares};
 use super::objective::{ProcessObjective, spread};
 use crate::model::{Parts, ProcessStructure, polynomial};
 
-/// Rates that the first filters have, and dead times, from the shortest to the longest that are looked at.
+/// The number of rates of the first filters, and of dead times, from the shortest to the longest that are evaluated.
 const RATES: usize = 8;
 const DEAD_TIMES: usize = 6;
 /// The longest dead time, as a fraction of the longest log.

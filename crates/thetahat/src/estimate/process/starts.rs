@@ -27,7 +27,8 @@ const DAMPINGS: [f64; 3] = [0.1, 0.4, 0.9];
 const FREQUENCIES: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 /// A third lag beside a pair, as a fraction of the longest one.
 const THIRD: f64 = 0.3;
-/// Dead times that are looked at where the output jumps with the input, then so many times some nearer to the best.
+/// The number of dead times that are evaluated where the output jumps with the input, and the number of rounds in which
+/// further ones, nearer to the best, are evaluated.
 const EVERY: usize = 48;
 const NEARER: usize = 6;
 const AROUND: i32 = 4;
@@ -82,7 +83,7 @@ pub(super) fn searched(
             found = past_jumps(objective, found, input, options, (deadline, monitor))?;
         }
     }
-    // Where a dead time wants to be less than zero the search stops at the border.
+    // Where a dead time wants to be less than zero the search stops at the bound.
     let places = objective.places();
     for (input, (_, dead_time)) in places.iter().enumerate().rev() {
         let Some(place) = *dead_time else { continue };
@@ -213,7 +214,7 @@ fn past_jumps(
                 best = (own.cost(), point);
             }
         }
-        // As far as the next one that was looked at.
+        // As far as the next one that was evaluated.
         let center = best.1[place];
         let first = (center * ratio.ln() / EVERY as f64).max(short);
         width = (width / f64::from(AROUND)).min(first);
@@ -265,7 +266,7 @@ fn first_grid(objective: &mut ProcessObjective<'_>) -> Vec<Vec<f64>> {
                     candidates.push(candidate);
                 }
             }
-            // The last ones are looked at by what searches from them.
+            // The last ones are evaluated by the searches from them.
             remaining -= 1;
             if remaining == 0 {
                 return candidates;

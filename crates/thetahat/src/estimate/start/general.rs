@@ -136,7 +136,7 @@ impl Data<'_> {
         let output = multiplied(&a, self.output, self.segments);
         let data = Data { output: &output, segments: &later, orders: without_a, ..*self };
         let start = data.output_error().refined("noise-poles", first)?;
-        let mut candidate = start.candidate(start.name, data.noise_behind(&start).as_ref(), without_a);
+        let mut candidate = start.candidate(start.name, data.noise_of_residuals(&start).as_ref(), without_a);
         candidate.parameters.splice(0..0, a[1..].iter().copied());
         Some(candidate)
     }

@@ -246,7 +246,7 @@ impl<'a> Data<'a> {
     /// filtered by D/C (Young 1976; Young and Jakeman, Int. J. Control 29, 1979).
     pub(super) fn box_jenkins(&self, starts: &[Start]) -> Vec<Candidate> {
         let candidate = |name, start: &Start| {
-            let noise = self.noise_behind(start);
+            let noise = self.noise_of_residuals(start);
             (start.candidate(name, noise.as_ref(), self.orders), noise)
         };
         let mut candidates = Vec::new();
@@ -277,9 +277,9 @@ impl<'a> Data<'a> {
         OutputError::new(self.output, self.inputs, self.segments, self.orders, self.deadline)
     }
 
-    /// The noise model of what a plant leaves, where there is no A; none where that is rounding, or white by the
-    /// orders.
-    pub(super) fn noise_behind(&self, start: &Start) -> Option<Mixed> {
+    /// The noise model of the residuals of a plant, where there is no A; none where the residuals are rounding, or
+    /// white by the orders.
+    pub(super) fn noise_of_residuals(&self, start: &Start) -> Option<Mixed> {
         if self.orders.nc + self.orders.nd == 0 {
             return None;
         }

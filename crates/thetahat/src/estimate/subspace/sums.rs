@@ -15,8 +15,8 @@ use crate::Error;
 /// The samples that a predictor runs over before its errors count.
 const RUN: usize = 10;
 
-/// The variance of errors, in squares of the scales, that sums in 32 digits do not tell from none.
-const UNSEEN: f64 = 1e-26;
+/// The variance of errors, in squares of the scales, that sums in 32 digits cannot distinguish from zero.
+const ROUNDING_VARIANCE: f64 = 1e-26;
 
 impl SubspaceOptions {
     /// How many lags of all signals a model and its errors are found from.
@@ -146,7 +146,7 @@ impl SubspaceSums<'_> {
         }
         let columns = joint_columns(&joint_taps(self.delays, self.outputs(), lags), self.outputs());
         let mean = products.mean_products_of(&columns, &combination, found.has_constant())
-            + DMatrix::identity(self.outputs(), self.outputs()) * UNSEEN;
+            + DMatrix::identity(self.outputs(), self.outputs()) * ROUNDING_VARIANCE;
         mean.iter().all(|value| value.is_finite()).then_some(mean)
     }
 }

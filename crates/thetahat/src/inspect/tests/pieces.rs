@@ -124,7 +124,7 @@ fn parts_tell_what_the_whole_tells() {
 }
 
 #[test]
-fn what_is_missing_and_gaps_may_lie_at_the_border() {
+fn what_is_missing_and_gaps_may_lie_at_the_boundary() {
     let mut channels = log(9000);
     let mut time: Vec<f64> = (0..9000).map(|row| 0.25 * f64::from(row)).collect();
     for &(channel, row) in &[(0, 4000), (3, 3999), (1, 6001), (3, 0), (3, 8999), (0, 8000), (0, 8001)] {
@@ -132,7 +132,7 @@ fn what_is_missing_and_gaps_may_lie_at_the_border() {
     }
     time[5000..].iter_mut().for_each(|time| *time += 10.0);
     time[7500..].iter_mut().for_each(|time| *time += 0.5);
-    // Holds and outliers across borders.
+    // Holds and outliers across boundaries.
     channels[3].1[4995..5010].fill(1.0);
     for row in [4001, 5998, 6000, 8998] {
         channels[3].1[row] = 1e4;

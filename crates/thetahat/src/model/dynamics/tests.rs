@@ -335,7 +335,7 @@ fn gains_lie_where_fieller_says() {
     let covariance = [[1e-4, 4e-5], [4e-5, 9e-4]];
     let square = two_sided(0.05).powi(2);
     // (n - g d)^2 = q^2 var(n - g d), with n = b and d = 1 + a.
-    let on_border = |d: f64, n: f64, g: f64| {
+    let on_boundary = |d: f64, n: f64, g: f64| {
         let variance = covariance[1][1] - 2.0 * g * covariance[0][1] + g * g * covariance[0][0];
         let distance = (n - g * d).powi(2) / (square * variance);
         assert!((distance - 1.0).abs() < 1e-9, "{d} {n} {g}: {distance}");
@@ -346,8 +346,8 @@ fn gains_lie_where_fieller_says() {
             unreachable!("it has both")
         };
         assert!(lower < gain.value && gain.value < upper);
-        on_border(0.1, b, lower);
-        on_border(0.1, b, upper);
+        on_boundary(0.1, b, lower);
+        on_boundary(0.1, b, upper);
     }
     // The gain 0 is not certain of its sign, and bounded.
     let interval = first_order(0.9, 0.0, covariance).dc_gain[0].unwrap().interval.unwrap();
@@ -355,10 +355,10 @@ fn gains_lie_where_fieller_says() {
     // Near an integrator the end that is there has the sign of b, and there is no other.
     let near = |pole, b| first_order(pole, b, covariance).dc_gain[0].unwrap().interval.unwrap();
     let Interval { lower: Some(lower), upper: None } = near(0.99, 0.5) else { unreachable!("it has one") };
-    on_border(0.01, 0.5, lower);
+    on_boundary(0.01, 0.5, lower);
     assert!(lower > 0.0 && lower < 50.0);
     let Interval { lower: None, upper: Some(upper) } = near(0.99, -0.5) else { unreachable!("it has one") };
-    on_border(0.01, -0.5, upper);
+    on_boundary(0.01, -0.5, upper);
     // Nothing is known of a gain of which neither part is, and of that of an unstable model.
     let nothing = Interval { lower: None, upper: None };
     assert_eq!([near(0.99, 0.01), near(1.001, 0.5)], [nothing; 2]);

@@ -62,7 +62,7 @@ pub struct ContinuousStateSpaceModel {
     /// N - p/l for N samples of l outputs and p free parameters of the model that it was made from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<usize>,
-    /// How many numbers of the model that it was made from the data say.
+    /// The number of free parameters of the model that it was made from.
     pub free_parameters: usize,
     /// The eigenvalues of A in radians a second, the largest first.
     pub poles: Vec<Root>,

@@ -37,7 +37,7 @@ pub(crate) fn step_response(
         let line = stroke(NEUTRAL, 1.2).with("dash", "dot");
         plain_line(name, Curve { x, y: vec![significant(level); 2] }, NEUTRAL).with("line", line)
     };
-    let mut traces = vec![dots, flat("level before", start, first), flat("regime", end, 0.0)];
+    let mut traces = vec![dots, flat("level before", start, first), flat("final steady state", end, 0.0)];
     let point = |name: &str, x: f64, s: f64, colour: &str| {
         let y = start + s * (end - start);
         scatter(name, vec![significant(x)], vec![significant(y)], "markers").with(
@@ -81,7 +81,7 @@ pub(crate) fn step_response(
     }
     let words = match response.shape {
         Shape::FirstOrder => {
-            "Measured output over the seconds since the step; the steepest tangent, from the level before to the regime; where 63.2 % of the \
+            "Measured output over the seconds since the step; the steepest tangent, from the level before to the final steady state; where 63.2 % of the \
              change are reached; and the response of a first order with the figures to trust."
         }
         Shape::Overdamped => {

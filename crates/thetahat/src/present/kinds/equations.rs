@@ -5,7 +5,7 @@ use super::{closing, mean_square, responses};
 use crate::estimate::EquationsOutcome;
 use crate::figures::{number, scientific, seconds, short, three};
 use crate::model::{EquationsModel, Signal};
-use crate::present::filtered::surprise;
+use crate::present::filtered::consistency;
 use crate::present::tree::{Sections, Table, columns, error, figure, word};
 use crate::present::words::{criteria, or_dash};
 use crate::report::Report;
@@ -40,7 +40,7 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &EquationsModel
     on.line(criteria(&estimation.criteria));
     procedure(on, report);
     if let Some(nis) = &outcome.nis {
-        on.line(surprise(nis));
+        on.line(consistency(nis));
     }
     if on.is_page() {
         on.line(format!("covariance multiplied by {}", three(outcome.covariance_factor)));

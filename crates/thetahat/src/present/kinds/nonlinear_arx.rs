@@ -174,10 +174,10 @@ fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
         "cv" => "as many as run best on five blocks, each by a model of the others".to_owned(),
         criterion => format!("as many as have the least {criterion}"),
     };
-    let (taken, looked_at) = (outcome.taken, outcome.path.len());
+    let (taken, evaluated) = (outcome.taken, outcome.path.len());
     match procedure {
         Procedure::Splits(_) => {
-            format!("local models, grown by splitting: {taken}, {how} (of {looked_at} looked at)")
+            format!("local models, grown by splitting: {taken}, {how} (of {evaluated} evaluated)")
         }
         Procedure::Neighbours(_) => {
             let asked = outcome.last().map_or_else(String::new, |step| step.term.clone());
@@ -193,12 +193,12 @@ fn choice(procedure: &Procedure, outcome: &TermsOutcome) -> String {
                 _ => &how,
             };
             format!(
-                "trained: {}, {best} (of {looked_at} tried)",
+                "trained: {}, {best} (of {evaluated} tried)",
                 outcome.last().map_or("", |step| &step.term)
             )
         }
         _ => format!(
-            "forward regression, {taken} of {} functions, {how} (of {looked_at} looked at)",
+            "forward regression, {taken} of {} functions, {how} (of {evaluated} evaluated)",
             outcome.candidates
         ),
     }

@@ -31,11 +31,7 @@ pub(super) fn samples(on: &mut Sections, estimation: &Estimation, noise_variance
         let slope = estimation.slope.map_or_else(String::new, |slope| {
             format!(" in the middle of the rows, slope {} a second", quantity(slope))
         });
-        on.line(format!(
-            "level of {} estimated with them: {}{slope}",
-            harmless(&output.name),
-            quantity(level)
-        ));
+        on.line(format!("operating point of '{}': {}{slope}", harmless(&output.name), quantity(level)));
     }
     on.line(criteria(&estimation.criteria));
 }

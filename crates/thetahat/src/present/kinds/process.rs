@@ -19,7 +19,7 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &ProcessModel) 
     on.gap();
     let Some(outcome) = report.estimation.procedure.process() else { return };
     let of_points = report.estimation.procedure.frequency_response().is_some();
-    let plain = if of_points { "by the points alone" } else { "if errors were white" };
+    let plain = if of_points { "by the points alone" } else { "assuming white residuals" };
     let head = ["parameter", "value", "unit", "standard error", plain];
     let mut parameters = columns("Parameters", head).words(&[2]).none(NO_ERROR);
     let units = model.structures.iter().zip(model.of_inputs());

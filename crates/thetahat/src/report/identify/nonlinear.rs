@@ -11,7 +11,7 @@ use thetahat_numerics::optimize::{Monitor, Search};
 
 use crate::Error;
 use crate::data::{Channel, Decision, FindingKind, Log, Record, Rows, Source, measured};
-use crate::estimate::stretches;
+use crate::estimate::thinned_to;
 use crate::figures::fixed;
 use crate::model::{Activation, Model, Orders};
 use crate::report::nonlinear_arx::{InputLags, MapPlan, NonlinearArxPlan, fit_planned};
@@ -22,7 +22,7 @@ use crate::select::{HeldOut, SelectedModel, Selection, Task, few_for_blocks, on_
 /// Lags that are always tried, and the most of each channel.
 const USUAL_LAGS: [usize; 2] = [2, 3];
 const MOST_LAGS: usize = 4;
-/// The best sets of lags are looked at further.
+/// The number of best sets of lags that are evaluated further.
 const BEST: usize = 3;
 /// Products help that lower the mean of the logarithms of free runs by so much.
 const HELPS: f64 = 0.1;
@@ -49,7 +49,7 @@ const LEAVES: f64 = 0.5;
 struct Rival {
     plan: NonlinearArxPlan,
     what: String,
-    seen: HeldOut,
+    held_out: HeldOut,
 }
 
 /// A log as it was read, and how a nonlinear model is fitted to it.
@@ -85,15 +85,15 @@ impl<'l> Nonlinear<'l> {
         found: SelectedModel,
         sources: &[Source],
     ) -> Result<(SelectedModel, Option<Report>), Error> {
-        let SelectedModel { mut selection, mut decisions, guess } = found;
+        let SelectedModel { mut selection, mut decisions, initial_parameters } = found;
         let mut taken = None;
         if selection.has_rivals() && task.looks_further() && !task.deadline.is_over() {
             let linear = selection.winners.as_ref().and_then(|winners| winners.simulation.held_out);
-            let percent = |seen: &HeldOut| fixed(seen.percent(), 1);
-            for Rival { plan, what, seen } in self.ranked(task, &selection) {
-                let nonlinear = format!("{what} fit {} % of blocks held out, in free runs", percent(&seen));
-                if !selection.is_far_behind(&seen) {
-                    if selection.is_behind(&seen) {
+            let percent = |held_out: &HeldOut| fixed(held_out.percent(), 1);
+            for Rival { plan, what, held_out } in self.ranked(task, &selection) {
+                let nonlinear = format!("{what}, free-run fit on held-out blocks {} %", percent(&held_out));
+                if !selection.is_far_worse_than(&held_out) {
+                    if selection.is_worse_than(&held_out) {
                         let words = format!("Nonlinear: {nonlinear}; not taken, as that is not far better.");
                         selection.steps.push(words);
                     }
@@ -124,7 +124,7 @@ impl<'l> Nonlinear<'l> {
                 break;
             }
         }
-        Ok((SelectedModel { selection, decisions, guess }, taken))
+        Ok((SelectedModel { selection, decisions, initial_parameters }, taken))
     }
 
     /// Models with what they do on blocks, the best first.
@@ -136,15 +136,15 @@ impl<'l> Nonlinear<'l> {
                 return None;
             }
             plan.search.time_limit = task.deadline.left();
-            let seen = self.on_blocks(&record, selection.level_window, &plan, task.monitor)?;
-            Some(Rival { plan, what, seen })
+            let held_out = self.on_blocks(&record, selection.level_window, &plan, task.monitor)?;
+            Some(Rival { plan, what, held_out })
         };
         let of_degree = |plan: &NonlinearArxPlan, degree: usize| {
             let few = plan.products(degree).is_ok_and(|products| PRODUCTS * products <= samples(&record));
             let plan = NonlinearArxPlan { map: MapPlan::Polynomial { degree }, ..plan.clone() };
             if few { run(plan, format!("products of degree {degree}")) } else { None }
         };
-        let better = |one: &Rival, other: &Rival| one.seen.both().total_cmp(&other.seen.both());
+        let better = |one: &Rival, other: &Rival| one.held_out.both().total_cmp(&other.held_out.both());
         let mut squares: Vec<Rival> =
             self.lags(selection).iter().filter_map(|plan| of_degree(plan, 2)).collect();
         squares.sort_by(better);
@@ -152,7 +152,7 @@ impl<'l> Nonlinear<'l> {
         let Some(first) = squares.first() else { return Vec::new() };
         let cubes = of_degree(&first.plan, 3);
         // A network is worth its training where products simulate better than none, found in the same way.
-        let least = |rival: Option<&Rival>| rival.map_or(f64::INFINITY, |rival| rival.seen.both());
+        let least = |rival: Option<&Rival>| rival.map_or(f64::INFINITY, |rival| rival.held_out.both());
         let straight = least(of_degree(&first.plan, 1).as_ref());
         let helps = straight - least(Some(first)).min(least(cubes.as_ref())) > HELPS;
         let trained = helps && samples(&whole) <= MOST_TRAINED;
@@ -218,7 +218,7 @@ impl<'l> Nonlinear<'l> {
         let fit = |training: &Record<'_>| {
             let few = match plan.map {
                 MapPlan::Network { .. } if samples(training) > TRAINED => {
-                    stretches(training, PIECES, TRAINED / PIECES)
+                    thinned_to(training, PIECES, TRAINED / PIECES)
                 }
                 _ => None,
             };

@@ -21,7 +21,8 @@ const CANDIDATES: usize = 1000;
 const MOST_CENTRES: usize = 2000;
 /// Units that are drawn, of which a choice takes some.
 const DRAWN: usize = 100;
-/// What a choice among trained maps looks at: units, and what the square of a number weighs, in samples.
+/// What a choice among trained maps varies: the number of units, and the weight of the square of a parameter, in
+/// samples.
 const SIZES: [usize; 3] = [2, 4, 8];
 const RIDGES: [f64; 2] = [0.1, 1.0];
 
@@ -76,7 +77,7 @@ pub(super) fn fit_map<'l>(
         (None, Select::Validation) => (Count::HeldOut(compared_on), "validation".to_owned()),
         (None, Select::Cv) => (Count::Blocks, "cv".to_owned()),
     };
-    // With a split the choice looks at models of the first part, and the chosen one is fitted to both.
+    // With a split the choice compares models of the first part, and the chosen one is fitted to both.
     let first_part = match (parts, &count) {
         (Some(parts), Count::HeldOut(_)) => Some(samples(&parts.estimation)?),
         _ => None,

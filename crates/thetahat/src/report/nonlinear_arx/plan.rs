@@ -14,9 +14,9 @@ use crate::model::{Activation, ChannelExpression, Membership};
 use crate::respond::Horizon;
 use crate::select::Select;
 
-/// Functions that a choice looks at, unless it is said otherwise.
+/// The default number of functions that a choice evaluates.
 const MOST: usize = 40;
-/// Local models that it looks at.
+/// The default number of local models that a choice evaluates.
 const MOST_LOCAL: usize = 10;
 /// Further starts of a training.
 const STARTS: usize = 4;
@@ -71,7 +71,7 @@ pub enum MapPlan {
         membership: Membership,
         /// Whether each is a plane: else it is a constant.
         planes: bool,
-        /// How many; none: `select` says it.
+        /// How many; none: chosen by `select`.
         units: Option<usize>,
     },
     /// A network with one hidden layer beside a linear path.
@@ -98,7 +98,7 @@ pub enum MapPlan {
     Neighbours {
         /// Whether they give a plane: else their mean.
         planes: bool,
-        /// How many; none: `select` says it.
+        /// How many; none: chosen by `select`.
         units: Option<usize>,
     },
 }
@@ -157,8 +157,8 @@ pub struct NonlinearArxPlan {
     /// Rows to validate on.
     pub validate: Vec<Rows>,
     /// Cuts the rows to estimate on into parts: models are fitted to the first one and compared, the chosen one is
-    /// fitted again to the first two, and judged on the third. None: where trained models are compared, and no rows are
-    /// to validate on, 70/30/0.
+    /// fitted again to the first two, and evaluated on the third. None: where trained models are compared, and no rows
+    /// are to validate on, 70/30/0.
     pub split: Option<Split>,
     /// What is taken from each channel.
     pub detrend: Detrend,
@@ -166,16 +166,16 @@ pub struct NonlinearArxPlan {
     pub offsets: Vec<(String, f64)>,
     /// Past values that are read of each output: y(k-1), …, y(k-n).
     pub output_lags: Vec<usize>,
-    /// What is read of each input.
+    /// The lags of each input.
     pub input_lags: Vec<InputLags>,
-    /// Whether those of the linear model that the data choose are tried, too, and taken where the model runs better on
-    /// rows held out.
+    /// Whether the lags of the chosen linear model are tried too, and used if the free run of the nonlinear model is
+    /// then better on held-out rows.
     pub lags_chosen: bool,
     /// The functions.
     pub map: MapPlan,
-    /// How many functions are taken; none: `select` says it.
+    /// The number of functions in the model; none: chosen by `select`.
     pub terms: Option<usize>,
-    /// How many functions a choice looks at; none: 40, and 10 local models.
+    /// How many functions a choice evaluates; none: 40, and 10 local models.
     pub most: Option<usize>,
     /// What makes one number of functions better than another; none: the free run on the validation rows where there
     /// are some, else that on five blocks of the estimation rows.

@@ -77,7 +77,7 @@ pub(super) struct ChosenProducts {
     /// How many; none: as many as have the least of the criterion.
     terms: Option<usize>,
     criterion: Option<String>,
-    /// How many are looked at, if that is said.
+    /// How many functions are evaluated; none: the default.
     most: Option<usize>,
 }
 
@@ -109,7 +109,7 @@ impl Settings {
             (
                 plan.prefilter.is_some(),
                 "prefilter",
-                "a filter reaches over the borders of pieces; filter the signals before",
+                "a filter reaches over the boundaries of pieces; filter the signals before",
             ),
             (
                 plan.trend,

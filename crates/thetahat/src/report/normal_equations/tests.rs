@@ -37,21 +37,21 @@ fn plan() -> Plan {
     Plan::new(&["u", "v"], "y", Orders::arx(2, &[2, 1], &[1, 3]).unwrap())
 }
 
-/// The rows from one border to the next, each piece with the past that it needs.
-fn pieces(log: &Log, plan: &Plan, borders: &[usize]) -> Vec<NormalEquations> {
+/// The rows from one boundary to the next, each piece with the past that it needs.
+fn pieces(log: &Log, plan: &Plan, boundaries: &[usize]) -> Vec<NormalEquations> {
     let Choice::Known(orders) = &plan.choice else { panic!("orders are given") };
     let made = |part: &Log, past: usize| NormalEquations::new(part, &[], plan, past).unwrap();
-    parts(log, orders.maximum_lag(), borders).iter().map(|(part, past)| made(part, *past)).collect()
+    parts(log, orders.maximum_lag(), boundaries).iter().map(|(part, past)| made(part, *past)).collect()
 }
 
-/// The rows from one border to the next, with those before them that a model reaches back to, and how many these are.
-fn parts(log: &Log, lags: usize, borders: &[usize]) -> Vec<(Log, usize)> {
+/// The rows from one boundary to the next, with those before them that a model reaches back to, and how many these are.
+fn parts(log: &Log, lags: usize, boundaries: &[usize]) -> Vec<(Log, usize)> {
     let names: Vec<&str> = log.channels().iter().map(|channel| channel.name.as_str()).collect();
     let part = |pair: &[usize]| {
         let past = lags.min(pair[0]);
         (log.part(&names, Rows::new(pair[0] - past + 1, pair[1]).unwrap()).unwrap(), past)
     };
-    borders.windows(2).map(part).collect()
+    boundaries.windows(2).map(part).collect()
 }
 
 fn merged(pieces: &[NormalEquations]) -> NormalEquations {
@@ -80,7 +80,7 @@ fn assert_same(found: &Report, expected: &Report, digits: f64) {
     for (a, b) in one.inputs.iter().chain([&one.output]).zip(other.inputs.iter().chain([&other.output])) {
         close(&b.name, a.offset.level, b.offset.level, b.offset.level.abs().max(1.0));
     }
-    // Where regressors nearly depend, what is open of an offset is a small difference of large numbers.
+    // Where regressors nearly depend, the uncertainty of an offset is a small difference of large numbers.
     let well = expected.estimation.condition.is_none_or(|condition| condition < 1e5);
     if let (Some(a), Some(b), true) = (&one.offset_covariance, &other.offset_covariance, well) {
         let constant = |of: &OffsetCovariance| of.covariance.last().unwrap().last().copied().unwrap();
@@ -103,7 +103,7 @@ fn assert_same(found: &Report, expected: &Report, digits: f64) {
 #[test]
 fn pieces_of_a_log_give_the_model_of_the_log() {
     let rows = 2000;
-    let borders = [0, 4, 5, 300, 1111, 1113, 1990, rows];
+    let boundaries = [0, 4, 5, 300, 1111, 1113, 1990, rows];
     for size in [[0.0, 0.0, 1.0], [20.0, -5.0, 1.0], [1e6, 1e3, 1e-4]] {
         let log = log(rows, size);
         for (detrend, constant) in [
@@ -114,7 +114,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
         ] {
             let plan = Plan { detrend, constant, ..plan() };
             let whole = identify(log.clone(), &[], &plan).unwrap();
-            let all = merged(&pieces(&log, &plan, &borders));
+            let all = merged(&pieces(&log, &plan, &boundaries));
             assert_eq!((all.rows(), all.samples(), all.pieces()), (rows, rows - 3, 7));
             // Without the offset taken, the fit on one machine has the condition number of large offsets.
             let condition = whole.estimation.condition.unwrap();
@@ -124,13 +124,13 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
 }
 
 #[test]
-fn missing_values_and_gaps_at_borders_stay_what_they_are() {
+fn missing_values_and_gaps_at_boundaries_stay_what_they_are() {
     let mut values = log(1500, [3.0, 1.0, 1.0]);
     let mut channels = values.channels().to_vec();
     for (channel, row) in [(2, 299), (2, 300), (0, 301), (1, 700), (2, 704), (0, 1199), (2, 0), (2, 1499)] {
         channels[channel].values[row] = f64::NAN;
     }
-    // A clock that stops for a while, at a border and elsewhere.
+    // A clock that stops for a while, at a boundary and elsewhere.
     let time =
         |t: usize| 0.5 * t as f64 + if t >= 900 { 30.0 } else { 0.0 } + if t >= 1000 { 7.0 } else { 0.0 };
     values = Log::with_time(channels, (0..1500).map(time).collect()).unwrap();
@@ -191,8 +191,8 @@ fn regressors_that_nearly_depend_are_solved_as_exactly() {
     let whole = identify(log.clone(), &[], &plan).unwrap();
     let condition = whole.estimation.condition.unwrap();
     assert!(condition > 1e6, "{condition:e}");
-    let borders = [0, 1000, 1999, 3500, rows];
-    let found = merged(&pieces(&log, &plan, &borders)).solve().unwrap();
+    let boundaries = [0, 1000, 1999, 3500, rows];
+    let found = merged(&pieces(&log, &plan, &boundaries)).solve().unwrap();
     // The bound of the fit on one machine.
     assert_same(&found, &whole, 1e-15 * condition);
     let again = merged(&pieces(&log, &plan, &[0, 77, rows])).solve().unwrap();
@@ -234,7 +234,7 @@ fn pieces_that_do_not_fit_together_are_refused_and_nothing_changes() {
     let early = made(&clock(part(48, 100), 47), &plan(), 3).unwrap();
     assert_refused(
         late.clone().merge(&early),
-        "the clock goes back over the border: the first pieces end at 99.5 s",
+        "the clock goes back over the boundary: the first pieces end at 99.5 s",
     );
 }
 

@@ -81,7 +81,7 @@ fn of_subspace(
             ));
         } else if order == last.order && last.order > first.order {
             warnings.push(format!(
-                "the order that fits best, {order}, is the highest that was looked at: give a range with higher ones, or leave trends and \
+                "the order that fits best, {order}, is the highest that was compared: give a range with higher ones, or leave trends and \
                  slow drifts out of the log"
             ));
         }

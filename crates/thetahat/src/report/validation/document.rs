@@ -50,8 +50,8 @@ pub struct Validation {
     pub noise: Vec<NoiseLevel>,
     /// How often the measured outputs lie in the prediction intervals.
     pub coverage: Vec<Coverage>,
-    /// What is left of each output; not of one of which too few samples count. Models in equations expect errors of
-    /// another size in each row: of theirs each is divided by its standard deviation.
+    /// The one-step residuals of each output; not of an output of which too few samples count. Models in equations
+    /// expect errors of another size in each row: each of their residuals is divided by its standard deviation.
     pub residuals: Vec<Residuals>,
     /// Whether the residuals of several outputs are white together (Hosking 1980); none of one output.
     #[serde(default, skip_serializing_if = "Option::is_none")]

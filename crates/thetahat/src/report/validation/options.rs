@@ -55,9 +55,9 @@ options! {
         horizon: Vec<usize>, "K[,K…]", "5", LOG;
         /// Lags of the tests of residuals; short logs have fewer
         lags: Option<usize>, "L", "25", TESTS;
-        /// Reject where less than this chance is left
+        /// Significance level
         alpha: Option<f64>, "LEVEL", "0.05", TESTS;
-        /// The levels of the bands of which Anderson's test counts what lies outside
+        /// The levels of the bands of Anderson's test, which counts the correlations outside
         alphas: Vec<f64>, "LEVEL[,LEVEL…]", "0.01,0.02,0.05,0.1,0.2", TESTS;
     }
 }

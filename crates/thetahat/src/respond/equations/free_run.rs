@@ -35,12 +35,12 @@ pub(crate) enum InitialState {
     Estimated,
 }
 
-/// A response to the inputs.
+/// A free run: the response to the inputs.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreeRun {
-    /// Where it starts.
+    /// The initial state.
     pub(crate) start: Vec<f64>,
-    /// The rows that it goes through, and what it says there, row after row.
+    /// The rows of the run, and the outputs in them, row after row.
     pub(crate) rows: Range<usize>,
     pub(crate) outputs: Vec<f64>,
 }

@@ -189,8 +189,8 @@ impl<'l> EquationsOnLog<'l> {
         each.collect()
     }
 
-    /// What `predict` says of an experiment with these parameters, and in the variances what is open of them: g' P g,
-    /// with the slopes g of the predictions by the parameters.
+    /// The predictions of an experiment with these parameters; their variances include the uncertainty of the
+    /// parameters, g' P g, where g are the derivatives of the predictions with respect to the parameters.
     fn with_open_parameters<P, D>(&self, log: usize, plain: P, dual: D) -> Result<Vec<Predicted<f64>>, Error>
     where
         P: Fn(&[f64]) -> Result<Vec<Predicted<f64>>, usize>,

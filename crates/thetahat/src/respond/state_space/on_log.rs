@@ -33,9 +33,9 @@ pub(crate) struct StateSpaceOnLog<'l> {
     /// The rows of free runs, in which outputs may be missing.
     free_runs: Vec<Range<usize>>,
     asked: Option<InitialCondition>,
-    /// What is left one step ahead, once somebody asked.
+    /// The one-step residuals, computed when they are first needed.
     innovations: OnceLock<Segments>,
-    /// What an uncertain state adds to their variances, likewise.
+    /// The contribution of an uncertain state to their variances, computed when it is first needed.
     added: OnceLock<Vec<Vec<f64>>>,
 }
 
@@ -115,7 +115,7 @@ impl<'l> StateSpaceOnLog<'l> {
         }
     }
 
-    /// What is left one step ahead.
+    /// The one-step residuals.
     fn left(&self, start: InitialCondition) -> Segments {
         let (record, signals) = (&self.ahead, self.ahead.signals());
         let mut predictor = Recursion::predictor(&self.matrices);

@@ -176,7 +176,7 @@ fn degrees_of_freedom_make_intervals_wider() {
     assert!((of(Some(1)) / of(None) - 3.0_f64.sqrt()).abs() < 1e-14);
 }
 
-/// A matrix of zeros but for the variances of what is open of the offset.
+/// A matrix of zeros but for the variances of the offset.
 fn open(model: &mut PolynomialModel, variances: &[f64], middle: Option<f64>) {
     let own = model.parameters.len();
     let size = own + variances.len();

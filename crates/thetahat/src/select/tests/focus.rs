@@ -16,7 +16,7 @@ fn compared(radius: f64, blocks: f64, onward: f64, unstable: usize) -> Compared 
     // As if each part had its share.
     Compared {
         scored,
-        guess: None,
+        initial_parameters: None,
         radius,
         noise_radius: 0.0,
         parts: Some((0..30).map(|k| blocks * (1.0 + 0.01 * f64::from(k))).collect()),
@@ -179,7 +179,7 @@ fn what_simulates_is_taken_where_the_plant_is_not_among_the_models() {
 }
 
 #[test]
-fn blocks_are_looked_at_as_far_ahead_as_the_focus_says() {
+fn blocks_are_predicted_as_far_ahead_as_the_focus_says() {
     let mut noise = Noise(19);
     let (u, e) = (noise.take(400), noise.take(400));
     let y = sum(&filtered(&[0.0, 1.0], &F, &u), &filtered(&[1.0], &F, &e), 0.3);
@@ -203,7 +203,7 @@ fn blocks_are_looked_at_as_far_ahead_as_the_focus_says() {
 }
 
 #[test]
-fn selection_on_unseen_rows_looks_at_the_horizon() {
+fn selection_on_held_out_rows_uses_the_horizon() {
     let mut noise = Noise(23);
     let (u, e) = (noise.take(500), noise.take(500));
     let y = sum(&filtered(&[0.0, 1.0, 0.5], &F, &u), &e, 0.5);
@@ -223,7 +223,8 @@ fn selection_on_unseen_rows_looks_at_the_horizon() {
         assert!((0.06..0.11).contains(&held_out_mse), "{select:?} {held_out_mse}");
         if select == Select::Validation {
             let model =
-                PolynomialModel::from_parameters(&orders, &found.guess.unwrap(), None, 1.0, 1.0).unwrap();
+                PolynomialModel::from_parameters(&orders, &found.initial_parameters.unwrap(), None, 1.0, 1.0)
+                    .unwrap();
             let run = simulate(&model, &second, InitialCondition::Estimate).unwrap();
             let own = (350..500).map(|t| (y[t] - run.values[t]).powi(2)).sum::<f64>() / 150.0;
             assert!(close(held_out_mse, own, 1e-9), "{held_out_mse} {own}");

@@ -146,10 +146,10 @@ fn a_search_for_each_finds_nothing_lower_among_the_best() {
     let (y, u) = signals(41, 600);
     let record = record(&y, &[&u], std::slice::from_ref(&(0..600)));
     let choice = Choice::Grid(grid(range(1, 3), range(1, 3), range(0, 3), 0.into(), 0.into()));
-    let SelectedModel { selection, guess, .. } =
+    let SelectedModel { selection, initial_parameters, .. } =
         chosen(&record, None, &choice, Select::MDL, Initial::Auto).unwrap();
     assert_eq!(selection.chosen.orders, Orders::armax(2, &[2], 2, &[1]).unwrap());
-    assert_eq!(guess.unwrap().len(), 6);
+    assert_eq!(initial_parameters.unwrap().len(), 6);
     // ARX models stand in the same table, on the same samples.
     assert_eq!((selection.models, selection.samples), (36, 600 - 3 - 30));
     let Choice::Grid(grid) = choice else { panic!("a grid") };

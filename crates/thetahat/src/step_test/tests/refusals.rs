@@ -21,7 +21,7 @@ fn without_noise_every_way_is_right() {
     for step in &exact.steps {
         assert_eq!(step.response.as_ref().map(|of| of.shape), Some(Shape::FirstOrder), "{step:?}");
     }
-    // A step counts from the row that sees it, and the regime lacks exp(-7) of the change.
+    // A step counts from the row that sees it, and the final steady state lacks exp(-7) of the change.
     for (figure, method, right, bound) in [
         (Gain, Regime, 2.0, 0.003),
         (DeadTime, TwoPoints, 0.3, 0.02),
@@ -118,9 +118,13 @@ fn what_cannot_be_read_off_is_refused() {
             true,
         ),
         (timed(&time, step.clone(), step.clone()), "within one step of the clock", true),
-        (stepped(&time, &[2.0], first_order(5.0, 0.0), || 0.0), "does not reach a regime", true),
+        (stepped(&time, &[2.0], first_order(5.0, 0.0), || 0.0), "does not reach a final steady state", true),
         // Noise hides that it still moves, but not that it has had no time.
-        (stepped(&time, &[2.0], first_order(3.0, 0.0), noise(0.2)), "does not reach a regime", true),
+        (
+            stepped(&time, &[2.0], first_order(3.0, 0.0), noise(0.2)),
+            "does not reach a final steady state",
+            true,
+        ),
         (
             stepped(&time, &[9.9], first_order(1.0, 0.0), || 0.0),
             "there are 495 rows before it and 5 after it",

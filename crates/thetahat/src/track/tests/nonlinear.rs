@@ -75,7 +75,7 @@ fn without_forgetting_it_is_the_batch_fit() {
 }
 
 /// Half of a log by a fit, the other half by the tracker that starts from it, is a fit of the whole: but for the row
-/// after the border, whose lags the tracker does not have.
+/// after the boundary, whose lags the tracker does not have.
 #[test]
 fn a_report_goes_on() {
     let (u, y) = samples(601, 9);

@@ -239,7 +239,7 @@ impl Objective for RunErrors<'_> {
     }
 }
 
-/// Samples in stretches without a hole, each cut into runs of the horizon.
+/// Segments of samples without a gap, each cut into runs of the horizon.
 fn runs(rows: &[usize], horizon: Horizon) -> Vec<Range<usize>> {
     let longest = match horizon {
         Horizon::Steps { steps } => steps.max(1),

@@ -83,7 +83,7 @@ fn their_number_is_chosen() {
 }
 
 #[test]
-fn neighbours_are_judged_without_themselves() {
+fn neighbours_are_evaluated_without_themselves() {
     let log = folded(400, 0.1);
     for planes in [false, true] {
         let plan = NonlinearArxPlan {

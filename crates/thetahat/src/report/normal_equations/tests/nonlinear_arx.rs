@@ -26,10 +26,10 @@ fn plan() -> NonlinearArxPlan {
     }
 }
 
-fn pieces(log: &Log, plan: &NonlinearArxPlan, borders: &[usize]) -> Vec<NormalEquations> {
+fn pieces(log: &Log, plan: &NonlinearArxPlan, boundaries: &[usize]) -> Vec<NormalEquations> {
     let made =
         |(part, past): &(Log, usize)| NormalEquations::of_nonlinear_arx(part, &[], plan, *past).unwrap();
-    parts(log, plan.lags(), borders).iter().map(made).collect()
+    parts(log, plan.lags(), boundaries).iter().map(made).collect()
 }
 
 /// Everything that a fit says of the model, to so many digits.
@@ -83,7 +83,7 @@ fn assert_same(found: &Report, expected: &Report, digits: f64) {
 
 #[test]
 fn pieces_of_a_log_give_the_model_of_the_log() {
-    let borders = [0, 4, 5, 300, 1111, 1113, 1990, 2000];
+    let boundaries = [0, 4, 5, 300, 1111, 1113, 1990, 2000];
     let expression = NonlinearArxPlan {
         expressions: vec!["sqrt(abs(u - 7))".into()],
         map: MapPlan::Products {
@@ -95,7 +95,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
         let log = log(2000, size);
         for plan in [plan(), NonlinearArxPlan { raw_terms: true, ..plan() }, expression.clone()] {
             let whole = fit_nonlinear_arx(&log, &[], &plan).unwrap();
-            let pieces = pieces(&log, &plan, &borders);
+            let pieces = pieces(&log, &plan, &boundaries);
             let all = merged(&pieces);
             assert_eq!((all.rows(), all.pieces(), all.samples()), (2000, 7, whole.estimation.samples));
             assert_same(&all.solve().unwrap(), &whole, digits);
@@ -109,7 +109,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
     let log = log(2000, [20.0, -5.0, 3.0]);
     for plan in [by(Some(5), None), by(None, Some(Select::MDL))] {
         let whole = fit_nonlinear_arx(&log, &[], &plan).unwrap();
-        let all = merged(&pieces(&log, &plan, &borders));
+        let all = merged(&pieces(&log, &plan, &boundaries));
         assert_same(&all.solve().unwrap(), &whole, 1e-12);
         assert_eq!(NormalEquations::from_json(&all.to_json().unwrap()).unwrap(), all);
         assert_eq!(all.name(), "NARX polynomial of degree 3");
@@ -123,7 +123,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
     let told = NonlinearArxPlan { offsets: vec![("u".into(), -4.0), ("y".into(), 20.5)], ..plan() };
     for plan in [told, NonlinearArxPlan { detrend: Detrend::None, ..plan() }] {
         let whole = fit_nonlinear_arx(&log, &[], &plan).unwrap();
-        let found = merged(&pieces(&log, &plan, &borders)).solve().unwrap();
+        let found = merged(&pieces(&log, &plan, &boundaries)).solve().unwrap();
         assert_same(&found, &whole, 1e-15 * whole.estimation.condition.unwrap().powi(2).max(1e3));
     }
 }

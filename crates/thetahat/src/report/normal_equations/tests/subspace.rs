@@ -66,7 +66,7 @@ fn assert_same(found: &Report, whole: &Report, digits: f64, errors: f64) {
 
 #[test]
 fn pieces_of_a_log_give_the_model_of_the_log() {
-    let borders = [0, 70, 300, 1111, 1113, 1990, 2000];
+    let boundaries = [0, 70, 300, 1111, 1113, 1990, 2000];
     let given = |past, future| SubspaceOptions { past: Some(past), future, ..SubspaceOptions::default() };
     let all = [SubspaceOptions::default(), given(12, None), given(50, None)];
     let classical = Weighting::ALL.map(|weighting| SubspaceOptions { weighting, ..given(10, Some(8)) });
@@ -79,7 +79,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
         ] {
             let plan = StateSpacePlan { subspace: *subspace, orders, constant, delays, ..plan() };
             let whole = fit_state_space(&log, &[], &plan).unwrap();
-            let found = merged(&pieces(&log, &plan, &borders)).solve().unwrap();
+            let found = merged(&pieces(&log, &plan, &boundaries)).solve().unwrap();
             assert_same(&found, &whole, 1e-12, 2e-2);
         }
     }

@@ -30,9 +30,9 @@ pub(super) fn plan() -> StateSpacePlan {
     StateSpacePlan { arx: Some(arx), ..StateSpacePlan::new(&["u", "v"], &["y", "z"]) }
 }
 
-pub(super) fn pieces(log: &Log, plan: &StateSpacePlan, borders: &[usize]) -> Vec<NormalEquations> {
+pub(super) fn pieces(log: &Log, plan: &StateSpacePlan, boundaries: &[usize]) -> Vec<NormalEquations> {
     let made = |(part, past): &(Log, usize)| NormalEquations::of_states(part, &[], plan, *past).unwrap();
-    parts(log, plan.lags(), borders).iter().map(made).collect()
+    parts(log, plan.lags(), boundaries).iter().map(made).collect()
 }
 
 /// The largest difference of the numbers of two documents of reports, relative to their size or to one.
@@ -74,7 +74,7 @@ fn assert_same(found: &Report, expected: &Report, digits: f64) {
 
 #[test]
 fn pieces_of_a_log_give_the_model_of_the_log() {
-    let borders = [0, 9, 10, 300, 1111, 1113, 1990, 2000];
+    let boundaries = [0, 9, 10, 300, 1111, 1113, 1990, 2000];
     let arx = plan().arx.unwrap();
     let ranges =
         VectorArxOptions { na: 0..=3, nb: VectorArxInputs::Alike(0..=4), coupling: None, ..arx.clone() };
@@ -91,7 +91,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
                 for delays in [vec![], vec![2, 0], vec![1, 3]] {
                     let plan = StateSpacePlan { arx: Some(arx.clone()), detrend, constant, delays, ..plan() };
                     let whole = fit_state_space(&log, &[], &plan).unwrap();
-                    let all = merged(&pieces(&log, &plan, &borders));
+                    let all = merged(&pieces(&log, &plan, &boundaries));
                     let found = all.solve().unwrap();
                     // Levels that are left in the signals take digits from the fit in one pass.
                     let digits = if detrend == Detrend::None && level > 0.0 { 1e-9 } else { 1e-12 };
@@ -106,7 +106,7 @@ fn pieces_of_a_log_give_the_model_of_the_log() {
     }
 }
 
-/// A log that misses the values of these channels in these rows, on a clock that stops for a while, at a border and
+/// A log that misses the values of these channels in these rows, on a clock that stops for a while, at a boundary and
 /// elsewhere.
 pub(super) fn with_gaps(missing: &[(usize, usize)]) -> Log {
     let mut channels = log(1500, 3.0).channels().to_vec();

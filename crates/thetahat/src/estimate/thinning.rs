@@ -1,4 +1,5 @@
-//! The parts of a record that starts see, and how large its output is.
+//! Segments of a long record, spread evenly over it, for computations that do not need all samples; and how large the
+//! output of a record is.
 
 use std::ops::Range;
 
@@ -6,13 +7,14 @@ use thetahat_numerics::regression::sum_of_squares;
 
 use crate::data::{JointRecord, Record, measured};
 
-/// From so many samples on, starts see stretches of the record only.
+/// Records of at least this many samples are thinned where initial parameters are sought: to `SEGMENTS` segments of
+/// `SEGMENT` samples each.
 pub(crate) const LONG: usize = 1 << 18;
-const STRETCHES: usize = 8;
-const STRETCH: usize = 1 << 12;
+const SEGMENTS: usize = 8;
+const SEGMENT: usize = 1 << 12;
 
-/// Copies of the samples of some segments, one segment after the other: work on them does not grow with the record that
-/// they come from.
+/// Copies of the samples of some segments, one segment after the other: the cost of computations with them does not
+/// depend on the length of the record that they come from.
 #[derive(Debug, Clone)]
 pub(crate) struct Packed {
     output: Vec<f64>,
@@ -35,7 +37,7 @@ impl Packed {
         Self { output: samples(record.output), inputs, segments }
     }
 
-    /// These as a record of which nothing was measured before a segment.
+    /// These samples as a record without measured samples before its segments.
     pub(super) fn record(&self) -> Record<'_> {
         Record {
             output: &self.output,
@@ -46,41 +48,43 @@ impl Packed {
     }
 }
 
-/// Stretches of a long record, spread evenly over its samples; none for a record that is not long.
+/// Segments of a long record, spread evenly over its samples; none for a record shorter than [`LONG`].
 pub(super) fn thinned(record: &Record<'_>) -> Option<Packed> {
     let total: usize = record.segments.iter().map(Range::len).sum();
-    if total < LONG { None } else { stretches(record, STRETCHES, STRETCH).map(|record| Packed::of(&record)) }
+    if total < LONG { None } else { thinned_to(record, SEGMENTS, SEGMENT).map(|record| Packed::of(&record)) }
 }
 
-/// The rows that starts see of many: such stretches, or of short segments every so many; none where these are all.
-pub(crate) fn seen_by_starts(segments: &[Range<usize>]) -> Option<Vec<Range<usize>>> {
+/// The rows from which initial parameters are sought: segments spread evenly over all, or, where the segments are
+/// short, every k-th of them; none where there are fewer than [`LONG`] rows, so that all are used.
+pub(crate) fn segments_of_starts(segments: &[Range<usize>]) -> Option<Vec<Range<usize>>> {
     let total: usize = segments.iter().map(Range::len).sum();
     if total < LONG {
         return None;
     }
-    let every = total.div_ceil(STRETCHES * STRETCH);
+    let every = total.div_ceil(SEGMENTS * SEGMENT);
     let some = || segments.iter().step_by(every).cloned().collect();
-    Some(spread(segments, STRETCHES, STRETCH).unwrap_or_else(some))
+    Some(thinned_segments(segments, SEGMENTS, SEGMENT).unwrap_or_else(some))
 }
 
-/// The same of a record with several outputs, in longer stretches.
+/// As [`thinned`], for a record with several outputs: the segments are four times as long.
 pub(super) fn thinned_joint<'a>(record: &JointRecord<'a>) -> Option<JointRecord<'a>> {
     let total: usize = record.segments.iter().map(Range::len).sum();
-    let segments = if total < LONG { None } else { spread(&record.segments, STRETCHES, 4 * STRETCH) }?;
+    let segments =
+        if total < LONG { None } else { thinned_segments(&record.segments, SEGMENTS, 4 * SEGMENT) }?;
     Some(JointRecord { segments, ..record.clone() })
 }
 
-/// So many stretches of at most so many samples, spread evenly over a record; none if of short segments less than half
-/// of that would be left.
-pub(crate) fn stretches<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
-    let segments = spread(&record.segments, count, length)?;
+/// A record of `count` segments of at most `length` samples each, spread evenly over the given one; none if they would
+/// hold less than half of `count * length` samples, as its segments are short.
+pub(crate) fn thinned_to<'a>(record: &Record<'a>, count: usize, length: usize) -> Option<Record<'a>> {
+    let segments = thinned_segments(&record.segments, count, length)?;
     let (output, inputs) = (record.output, record.inputs.clone());
     let past = vec![0; segments.len()];
     Some(Record { output, inputs, segments, past })
 }
 
-/// The rows of such stretches.
-fn spread(all: &[Range<usize>], count: usize, length: usize) -> Option<Vec<Range<usize>>> {
+/// The rows of the segments of [`thinned_to`].
+fn thinned_segments(all: &[Range<usize>], count: usize, length: usize) -> Option<Vec<Range<usize>>> {
     let total: usize = all.iter().map(Range::len).sum();
     let mut segments = Vec::with_capacity(count);
     let (mut before, mut rest) = (0, all.iter().peekable());
@@ -112,8 +116,8 @@ pub(super) fn energy(record: &Record<'_>) -> f64 {
         .sum()
 }
 
-/// Gives `starts` a record without missing outputs: these are put on lines from one measured output to the next. Starts
-/// need to lead near the minimum, no more.
+/// Gives `starts` a record without missing outputs: these are interpolated linearly between the measured ones. Initial
+/// parameters only have to lie near the minimum.
 pub(super) fn filled<T>(record: &Record<'_>, starts: impl FnOnce(&Record<'_>) -> T) -> T {
     let runs = |segment: &Range<usize>| measured(record.output, segment);
     let whole = |segment: &Range<usize>| runs(segment).first() == Some(segment);

@@ -9,10 +9,10 @@ use crate::data::Log;
 /// A row: a value of each channel, none where it is missing.
 type Row = Vec<Option<f64>>;
 
-/// Where some pieces that follow one another begin and end. Each keeps as many rows as the model reaches back to, or as
-/// it has of them.
+/// The first and the last rows of some consecutive pieces: as many as the maximum lag of the model, or as the pieces
+/// have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub(super) struct Border {
+pub(super) struct Boundary {
     /// How many rows before the first one of their own there are.
     past: usize,
     /// The last of these; without a past the first rows.
@@ -22,7 +22,7 @@ pub(super) struct Border {
     times: Option<[f64; 2]>,
 }
 
-impl Border {
+impl Boundary {
     pub(super) fn new(log: &Log, names: &[&str], past: usize, lags: usize) -> Result<Self, Error> {
         let channels: Vec<&[f64]> = names
             .iter()
@@ -53,7 +53,7 @@ impl Border {
                 && start <= end
             {
                 return Err(Error::data(format!(
-                    "the clock goes back over the border: the first pieces end at {end} s, and the rows of the second ones begin at {start} s; \
+                    "the clock goes back over the boundary: the first pieces end at {end} s, and the rows of the second ones begin at {start} s; \
                      merge pieces in the order of time, each row once"
                 )));
             }

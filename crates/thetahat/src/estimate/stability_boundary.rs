@@ -1,4 +1,4 @@
-//! Steps that come to the border of stability.
+//! Steps that cross the boundary of stability.
 //!
 //! A step of Gauss and Newton often takes a root of C or F out of the unit circle: the data want a slower mode than
 //! there is, or an unstable one. In a shorter step, or a damped one, all parameters would wait for that root, and a
@@ -19,7 +19,7 @@ const NEARER: f64 = 0.2;
 
 /// Memory for such steps, taken once.
 #[derive(Debug)]
-pub(super) struct Border {
+pub(super) struct StabilityBoundary {
     stable_a: bool,
     before: Polynomials,
     after: Polynomials,
@@ -28,7 +28,7 @@ pub(super) struct Border {
     scratch: Vec<f64>,
 }
 
-impl Border {
+impl StabilityBoundary {
     /// For models whose A has to be stable too, or need not be.
     pub(super) fn new(orders: &Orders, stable_a: bool) -> Self {
         let zero = vec![0.0; orders.parameters()];

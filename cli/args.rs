@@ -12,6 +12,7 @@ mod fit;
 mod inspect;
 mod lines;
 mod log;
+mod model;
 mod options;
 mod reduce;
 mod respond;
@@ -36,6 +37,7 @@ pub(crate) use fit::FitArguments;
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};
 pub(crate) use log::{ClockArguments, LiveClockArguments, LogArguments, Names};
+pub(crate) use model::ModelArguments;
 pub(crate) use options::OptionArguments;
 pub(crate) use reduce::ReduceArguments;
 pub(crate) use respond::{
@@ -259,6 +261,18 @@ Examples:
   thetahat convert model.json --to 0.5 -o slower.json
   thetahat convert model.json --to continuous --hold tustin -o continuous.json")]
     Convert(ConvertArguments),
+    /// A model whose numbers are known, as a report that all verbs take
+    ///
+    /// Of polynomials in rising powers of q^-1 (zeros at the beginning of B are samples that the input waits), of
+    /// transfer functions in falling powers of z or s, or of matrices. Nothing is estimated: there are no standard
+    /// errors and no figures of a fit. predict, simulate, validate, compare, filter, step, bode, reduce, convert,
+    /// control and export take the report as they take that of fit.
+    #[command(after_help = "\
+Examples:
+  thetahat model --b 0,1 --f 1,-0.9 --sample-time 1 --report model.json
+  thetahat model --num 3 --den 10,1 --delay 2 -u heater -y temperature --report model.json
+  thetahat model --state-matrix '0.9,0.1;0,0.8' --input-matrix '0;1' --output-matrix 1,0 --sample-time 0.1")]
+    Model(Box<ModelArguments>),
     /// PI and PID settings for a fitted process, and the closed loop that they give
     ///
     /// By SIMC (Skogestad 2003) and by lambda tuning, from a process that fit --structure found. Prints the settings

@@ -14,6 +14,7 @@ mod filter;
 mod fit;
 mod help;
 mod inspect;
+mod model;
 mod pieces;
 mod reduce;
 mod respond;
@@ -54,6 +55,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Impulse(arguments) => transient::impulse(&arguments, line),
         Command::Reduce(arguments) => reduce::reduce(&arguments),
         Command::Convert(arguments) => convert::convert(&arguments),
+        Command::Model(arguments) => model::model(&arguments),
         Command::Tune(arguments) => tune::tune(&arguments, line),
         Command::Control(arguments) => control::control(&arguments),
         Command::Export(arguments) => export::export(&arguments),

@@ -3,6 +3,7 @@
 //! The libraries name them between backticks, as `detrend`, wherever one is advised; here they are options.
 
 use thetahat::design::DesignOptions;
+use thetahat::model::KnownOptions;
 use thetahat::options::{OptionRow, Options};
 use thetahat::plan::FitOptions;
 use thetahat::report::ValidationOptions;
@@ -10,7 +11,8 @@ use thetahat::spectrum::SpectrumOptions;
 use thetahat::track::TrackOptions;
 
 /// The tables of options.
-const TABLES: [&[OptionRow]; 5] = [
+const TABLES: [&[OptionRow]; 6] = [
+    KnownOptions::TABLE,
     FitOptions::TABLE,
     DesignOptions::TABLE,
     SpectrumOptions::TABLE,

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 22] = [
+const VERBS: [&str; 23] = [
     "fit",
     "inspect",
     "spectrum",
@@ -19,6 +19,7 @@ const VERBS: [&str; 22] = [
     "step",
     "reduce",
     "convert",
+    "model",
     "tune",
     "control",
     "export",

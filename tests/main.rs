@@ -40,6 +40,7 @@ mod identities;
 mod impulse_response;
 mod inspect;
 mod interrupt;
+mod known;
 mod likelihood;
 mod names;
 mod nonlinear_arx;

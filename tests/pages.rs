@@ -338,7 +338,7 @@ fn options_that_pages_name_exist() {
     let folder = Folder::new();
     let verbs = [
         "fit", "inspect", "predict", "simulate", "validate", "compare", "track", "filter", "bode", "step",
-        "impulse", "spectrum", "design", "tune", "control", "reduce", "convert", "export",
+        "impulse", "spectrum", "design", "tune", "control", "reduce", "convert", "model", "export",
     ];
     let help: String = verbs.iter().map(|verb| folder.done(&format!("{verb} --help")).stdout).collect();
     let known: Vec<&str> = help.split(|c: char| !c.is_ascii_lowercase() && c != '-').collect();

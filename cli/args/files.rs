@@ -73,6 +73,7 @@ impl Command {
                 read.push(reduce.report.clone());
                 written.push(reduce.out.clone());
             }
+            Self::Model(model) => written.extend(model.report.iter().cloned()),
             Self::Convert(convert) => {
                 read.push(convert.report.clone());
                 written.extend(convert.out.clone());

@@ -13,17 +13,30 @@ use crate::failure::Failure;
 use crate::options::with_options;
 
 /// Values of these may begin with a hyphen.
-const MAY_BE_NEGATIVE: [&str; 21] = [
+const MAY_BE_NEGATIVE: [&str; 35] = [
+    "a",
     "alarm",
     "alpha",
     "alphas",
+    "b",
     "band",
+    "c",
+    "d",
     "dc_gain",
     "dead_zone",
+    "delay",
+    "den",
+    "f",
+    "feedthrough_matrix",
     "frequencies",
     "horizon",
+    "input_matrix",
     "noise_bound",
+    "noise_covariance",
+    "noise_gain",
     "norm",
+    "num",
+    "output_matrix",
     "prefilter",
     "range",
     "regressor",
@@ -31,6 +44,7 @@ const MAY_BE_NEGATIVE: [&str; 21] = [
     "rms",
     "sample_time",
     "split",
+    "state_matrix",
     "step",
     "time_limit",
     "tolerance",
@@ -91,9 +105,12 @@ fn argument(option: &OptionRow) -> Arg {
         _ => own,
     };
     let words = (option.words)();
+    if option.form == Form::Flag {
+        return own.action(ArgAction::SetTrue);
+    }
     let own = own.value_name(option.notation).allow_hyphen_values(MAY_BE_NEGATIVE.contains(&option.field));
     let own = match option.form {
-        Form::Flag => return own.action(ArgAction::SetTrue),
+        Form::Flag => own,
         Form::Single => own.action(ArgAction::Set),
         Form::List => own.action(ArgAction::Append).value_delimiter(','),
         Form::Repeated => own.action(ArgAction::Append),

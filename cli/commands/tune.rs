@@ -23,7 +23,7 @@ pub(crate) fn tune(arguments: &TuneArguments, line: &str) -> Result<(), Failure>
         }),
     };
     let found =
-        tuned(process, &plan).map_err(|error| Failure::about(&error, |_| report.display().to_string()))?;
+        tuned(&process, &plan).map_err(|error| Failure::about(&error, |_| report.display().to_string()))?;
     if let Some(path) = &arguments.html {
         output::page(path, &tuning_page(&found, line))?;
     }

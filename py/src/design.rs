@@ -90,7 +90,7 @@ pub(crate) fn tune(
     };
     let plan = TuningPlan { input, closed_loop_time, controller };
     let model = Arc::clone(model.get().model());
-    let found = interruptible(py, move |_| thetahat::tune::tune(model.process("settings are")?, &plan))?;
+    let found = interruptible(py, move |_| thetahat::tune::tune(&*model.process("settings are")?, &plan))?;
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
     Ok((json, tables::tuning(&found, error::layout())))
 }

@@ -9,22 +9,26 @@ use pyo3::prelude::*;
 use thetahat::Document;
 use thetahat::data::Channel;
 use thetahat::export::{Plan, export};
-use thetahat::model::{LinearModel, PolynomialModel, Quantity, StateSpace};
+use thetahat::model::{KnownOptions, LinearModel, PolynomialModel, Quantity, StateSpace, ZerosPolesGain};
 use thetahat::plan::Fitted;
 use thetahat::present::tables;
 use thetahat::report::{PendingEvaluation, Report, apply, sample};
 use thetahat::respond::{Draws, Horizon, InitialCondition, TransientResponse, logarithmic_frequencies};
 use thetahat::spectrum::MeasuredResponse;
+use thetahat::thetahat_core::nalgebra::Complex;
 
 use crate::array::{from_matrix, matrix, vector};
 use crate::error;
 use crate::grey_box::GreyBox;
 use crate::log::{Log, copy};
-use crate::plan::draft;
+use crate::plan::{draft, options};
 use crate::work::interruptible;
 
 /// Names of files, and what they hold.
 type Files = Vec<(String, String)>;
+
+/// Roots, each with its imaginary part.
+type Roots = Vec<(f64, f64)>;
 
 /// A fitted model: the document that `thetahat fit` writes.
 ///
@@ -92,6 +96,14 @@ impl Model {
     fn from_json(py: Python<'_>, text: &str) -> PyResult<Self> {
         let report = Report::from_json(text).map_err(|error| error::batch(py, error))?;
         Ok(Self::of(report))
+    }
+
+    /// One of numbers that are known, the options of a plan in JSON.
+    #[staticmethod]
+    fn known(py: Python<'_>, plan: &str) -> PyResult<Self> {
+        let known: KnownOptions = options(py, plan)?;
+        let model = known.model().map_err(|error| error::batch(py, error))?;
+        Ok(Self::of(Report::of_known(model)))
     }
 
     /// The document.
@@ -353,6 +365,14 @@ impl Model {
     /// How much of its inputs each state passes on to the outputs.
     fn hankel_singular_values(&self, py: Python<'_>) -> PyResult<Vec<f64>> {
         self.report(py)?.hankel_singular_values().map_err(|error| error::batch(py, error))
+    }
+
+    /// Zeros, poles and gain from an input to an output, of a model in state space, sampled or not.
+    fn transfer(&self, py: Python<'_>, output: usize, input: usize) -> PyResult<(Roots, Roots, f64)> {
+        let found = self.model.transfer(output, input);
+        let ZerosPolesGain { zeros, poles, gain } = found.map_err(|error| error::batch(py, error))?;
+        let pairs = |roots: Vec<_>| roots.into_iter().map(|root: Complex<f64>| (root.re, root.im)).collect();
+        Ok((pairs(zeros), pairs(poles), gain))
     }
 
     /// The model with fewer states.

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Callable, Optional, get_type_hints
@@ -368,3 +369,17 @@ def test_a_fit_without_time_looks_for_one_start(log: th.Log) -> None:
     starts = [model.document["estimation"]["starts"] for model in (plenty, none)]
     assert len(starts[0]) > 20 and len(starts[1]) == 1
     assert none.document["estimation"]["stopped"] == "time-limit"
+
+
+def test_warnings_point_at_the_line_that_called(tmp_path: Path) -> None:
+    log = th.dc_motor()
+    holes = log.y[:, 0].copy() if log.y.ndim == 2 else log.y.copy()
+    holes[::3] = np.nan
+    gaps = th.Log(holes, log.u, sample_time=0.01)
+    path = tmp_path / "log.csv"
+    path.write_text("made by a logger\n\nt,u,y\ns,V,C\n" + "".join(f"{k},{k % 3},{k % 5}\n" for k in range(20)))
+    for call in (lambda: th.oe(gaps, 2, 2), lambda: th.fit(gaps, plan=th.oe(log, 2, 2)), lambda: th.read_csv(path)):
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            call()
+        assert found and {one.filename for one in found} == {__file__}

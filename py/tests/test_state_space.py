@@ -233,5 +233,5 @@ def test_continuous_time_is_that_of_scipy() -> None:
         model.converted("slow")
     with pytest.raises(ValueError, match="is none of zoh, foh and tustin"):
         model.converted(1.0, "ramp")
-    with pytest.raises(ValueError, match="has a delay"):
+    with pytest.raises(ValueError, match="has a dead time"):
         th.ss(data, 2, nk=3).converted("continuous").to_scipy()

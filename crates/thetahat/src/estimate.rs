@@ -175,6 +175,8 @@ pub enum Procedure {
     Subspace(SubspaceOutcome),
     /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
     VectorArx(VectorArxOutcome),
+    /// Not at all: the numbers of the model were given.
+    Given,
 }
 
 /// How to estimate.

@@ -30,6 +30,7 @@ mod dynamics;
 pub(crate) mod equations;
 mod fitted;
 mod kind;
+mod known;
 mod linear;
 mod nonlinear_arx;
 mod orders;
@@ -48,6 +49,7 @@ pub(crate) use fitted::is_covariance;
 pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub(crate) use kind::FilterForm;
 pub use kind::Model;
+pub use known::{ChannelNames, Coefficients, KnownOptions, Matrix, Polynomials, TransferFunction};
 pub use linear::LinearModel;
 pub(crate) use nonlinear_arx::Evaluator;
 pub use nonlinear_arx::{

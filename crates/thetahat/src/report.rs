@@ -50,6 +50,7 @@ mod fitted_rows;
 mod from_sums;
 mod held_out_runs;
 mod identify;
+mod known;
 mod nonlinear_arx;
 mod nonlinear_choice;
 mod normal_equations;

@@ -281,12 +281,12 @@ def fit_experiments(
     if fit in (arx, ar, fir, ss):
         for name in sorted(set(options) - set(inspect.signature(_NormalEquations).parameters)):
             raise ValueError(f"{name}: the model is made in one pass over the experiments, which does not know it; leave it out")
-        return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve(), stacklevel=3)
+        return told(normal_equations(logs, experiments=True, read=read, **options).compute().solve())
     work = _many.Work(read=dict(read or {}))
     runs = _runs(_pieces(logs), per_task)
     shares = _shares(runs, per_task)
     if fit is grey:
-        return told(_equations(work, shares, bound.arguments), stacklevel=3)
+        return told(_equations(work, shares, bound.arguments))
     own = _options.plan({"model": fit.__name__, **{name: value for name, value in bound.arguments.items() if name != "log"}})
     held = dask.persist(*[dask.delayed(_experiments)(work, share, own) for share in shares])
     known = list(chain(*dask.compute(*[dask.delayed(_described)(part, len(runs)) for part in held])))
@@ -299,7 +299,7 @@ def fit_experiments(
     else:
         held = dask.persist(*[dask.delayed(_deviations)(part, own, offsets) for part in held])
         found = every.fit(own, _asking(_answers, held, shares, own))
-    return told(Model._of(found), stacklevel=3)
+    return told(Model._of(found))
 
 
 def _asking(

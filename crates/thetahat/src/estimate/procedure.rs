@@ -48,7 +48,8 @@ impl Procedure {
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
             | Self::Subspace(_)
-            | Self::VectorArx(_) => NullDistribution::Known,
+            | Self::VectorArx(_)
+            | Self::Given => NullDistribution::Known,
         }
     }
 
@@ -72,8 +73,19 @@ impl Procedure {
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
             | Self::Subspace(_)
-            | Self::VectorArx(_) => FilteredCovariance::Unknown,
+            | Self::VectorArx(_)
+            | Self::Given => FilteredCovariance::Unknown,
         }
+    }
+
+    /// That of numbers that were given.
+    pub(crate) fn given() -> Self {
+        Self::Given
+    }
+
+    /// Whether nothing was estimated.
+    pub fn is_given(&self) -> bool {
+        matches!(self, Self::Given)
     }
 
     /// Whether it was by instrumental variables, which say nothing of the noise.
@@ -100,7 +112,8 @@ impl Procedure {
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
             | Self::Subspace(_)
-            | Self::VectorArx(_) => None,
+            | Self::VectorArx(_)
+            | Self::Given => None,
         }
     }
 

@@ -298,7 +298,7 @@ impl PolynomialModel {
 impl ProcessModel {
     /// A, B, C and D, and the dead times as delays, with the errors that follow from those of the parameters; delays
     /// have none. Errors are white from sample to sample.
-    fn in_state_space(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
+    pub(super) fn in_state_space(&self, hold: Hold) -> Result<ContinuousStateSpaceModel, Error> {
         let matrices = self.matrices_of(&self.parts());
         let head = Head {
             inputs: self.inputs.clone(),

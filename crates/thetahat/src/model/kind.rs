@@ -12,8 +12,9 @@ use super::nonlinear_arx::NonlinearArxModel;
 use super::orders::Structure;
 use super::process::ProcessModel;
 use super::quantity::Quantity;
-use super::state_space::{ContinuousStateSpaceModel, Hold, StateSpace, StateSpaceModel};
+use super::state_space::{ContinuousStateSpaceModel, Hold, StateSpace, StateSpaceModel, ZerosPolesGain};
 use crate::Error;
+use crate::data::Offset;
 
 /// An estimated model of any kind.
 ///
@@ -105,6 +106,29 @@ impl Model {
             Self::StateSpace(model) => &model.outputs,
             Self::ContinuousStateSpace(model) => &model.outputs,
         }
+    }
+
+    /// Sets what a channel is measured from: where the plant rests, or works.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that is no channel of the model, and a model in equations, which has no offsets.
+    pub fn set_offset(&mut self, name: &str, level: f64) -> Result<(), Error> {
+        if !self.has_offsets() {
+            return Err(Error::argument("offset", "equations describe signals as they are; leave it out"));
+        }
+        let (inputs, outputs) = match self {
+            Self::Polynomial(model) => (&mut *model.inputs, std::slice::from_mut(&mut model.output)),
+            Self::Equations(model) => (&mut *model.inputs, &mut *model.outputs),
+            Self::NonlinearArx(model) => (&mut *model.inputs, &mut *model.outputs),
+            Self::Process(model) => (&mut *model.inputs, std::slice::from_mut(&mut model.output)),
+            Self::StateSpace(model) => (&mut *model.inputs, &mut *model.outputs),
+            Self::ContinuousStateSpace(model) => (&mut *model.inputs, &mut *model.outputs),
+        };
+        let own = inputs.iter_mut().chain(outputs).find(|signal| signal.name == name);
+        let own =
+            own.ok_or_else(|| Error::argument("offset", format!("'{name}' is no channel of the model")))?;
+        own.offset = Offset { level, ..Offset::default() };
+        Ok(())
     }
 
     /// The names of the channels: inputs, then outputs.
@@ -325,6 +349,22 @@ impl Model {
         }
     }
 
+    /// Zeros, poles and gain from an input to an output: in the z plane, of a model in continuous time in the s plane
+    /// and without its dead time.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a channel that is not there, and for models that are not linear; [`Error::Undetermined`]
+    /// if the zeros do not converge.
+    pub fn transfer(&self, output: usize, input: usize) -> Result<ZerosPolesGain, Error> {
+        match self {
+            Self::ContinuousStateSpace(model) => model.transfer(output, input),
+            Self::Process(model) => model.in_state_space(Hold::Zero)?.transfer(output, input),
+            Self::Polynomial(_) | Self::StateSpace(_) | Self::Equations(_) | Self::NonlinearArx(_) => {
+                self.innovations_form()?.transfer(output, input)
+            }
+        }
+    }
+
     /// What a filter of its state runs on.
     ///
     /// # Errors
@@ -421,12 +461,18 @@ impl Model {
         }
     }
 
-    /// The process.
+    /// The process, or a model in continuous time that is one: of one input and one output, with real poles, no zeros
+    /// and no more than three lags.
     ///
     /// # Errors
     /// [`Error::Argument`] if it is none; `what` is of one.
-    pub fn process(&self, what: &str) -> Result<&ProcessModel, Error> {
-        self.as_process().ok_or_else(|| {
+    pub fn process(&self, what: &str) -> Result<Cow<'_, ProcessModel>, Error> {
+        let found = match self {
+            Self::Process(model) => Some(Cow::Borrowed(&**model)),
+            Self::ContinuousStateSpace(model) => model.as_process().map(Cow::Owned),
+            Self::Polynomial(_) | Self::Equations(_) | Self::NonlinearArx(_) | Self::StateSpace(_) => None,
+        };
+        found.ok_or_else(|| {
             let message =
                 format!("it is {}, and {what} of a process: fit one (`structure` p1d)", self.name());
             Error::argument("model", message)

@@ -57,7 +57,7 @@ impl StateSpace {
     /// # Errors
     /// [`Error::Argument`] for matrices whose shapes do not fit or that are not finite, and a sample time that is not
     /// above 0.
-    fn check(&self) -> Result<(), Error> {
+    pub(in crate::model) fn check(&self) -> Result<(), Error> {
         fit_together([
             ("F", &self.f),
             ("G", &self.g),

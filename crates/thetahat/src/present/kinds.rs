@@ -35,7 +35,7 @@ pub(super) fn present(on: &mut Sections, report: &Report, converted: bool) {
 
 /// The fits at the end of a text. Pages have them below the outputs.
 fn closing(on: &mut Sections, report: &Report) {
-    if !on.is_page() {
+    if !on.is_page() && !report.fit.is_empty() {
         on.gap();
         on.table(fits(&report.fit));
     }

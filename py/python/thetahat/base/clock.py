@@ -158,8 +158,7 @@ class Labels(NamedTuple):
         if lasts >= SLOW and lasts % 60 != 0:
             _said.warn(
                 f"{argument}: numbers near {low:.3g} with steps of {step:g} may be {unit} since 1970, with {lasts:g} s from row to "
-                "row; they are taken as seconds; give times (pandas.to_datetime with its unit), or seconds",
-                stacklevel=4,
+                "row; they are taken as seconds; give times (pandas.to_datetime with its unit), or seconds"
             )
             return self
         instants = np.floor(numbers).astype(np.int64)
@@ -533,7 +532,7 @@ def assumed(index: Any) -> Clock:
     if labels.values.dtype.kind in "iu" and (len(steps) == 0 or (steps == 1).all()):
         return Clock("assumed, as the index is a counter", None, labels)
     how = "name it, and give its name as time" if labels.name is None else f"time={labels.name!r} takes it as seconds"
-    _said.warn(f"the index holds numbers and may be a clock; {how}; 1 s from row to row is assumed", stacklevel=4)
+    _said.warn(f"the index holds numbers and may be a clock; {how}; 1 s from row to row is assumed")
     return Clock("assumed, as the index holds numbers", None, labels)
 
 

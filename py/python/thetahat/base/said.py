@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,13 +16,19 @@ class EstimationWarning(UserWarning):
     """What to know of a model before relying on it, such as missing samples or a search that did not converge."""
 
 
-def warn(message: str, category: type[Warning] = UserWarning, stacklevel: int = 1) -> None:
-    """Warn as `warnings.warn` does, or keep the words for who asked for them."""
+_PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep
+
+
+def warn(message: str, category: type[Warning] = UserWarning) -> None:
+    """Warn at the line that called into the package, or keep the words for who asked for them."""
     words = _kept.get()
-    if words is None:
-        warnings.warn(message, category, stacklevel=stacklevel + 1)
-    else:
+    if words is not None:
         words.append(message)
+        return
+    frame, level = sys._getframe(1), 2
+    while frame.f_back is not None and os.path.abspath(frame.f_code.co_filename).startswith(_PACKAGE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 @contextmanager

@@ -250,6 +250,15 @@ def quantile(level: float) -> float:
     return NormalDist().inv_cdf((1 + level) / 2)
 
 
+def named(name: str, value: Any) -> dict[str, float] | None:
+    """Numbers by names."""
+    if value is None:
+        return None
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{name}: expected a dict, found {value!r}")
+    return {text(name, key): float(number(name, one)) for key, one in value.items()} or None
+
+
 def text(name: str, value: Any) -> str:
     """The value, if it is a str."""
     if not isinstance(value, str):

@@ -449,7 +449,7 @@ def fit(
             raise ValueError("plan: the document of this model has none; fit it again")
         chosen = log.select(inputs=known.pop("input", None), output=known.pop("output", None))
         given = json.loads(_options.plan({"narx": narx, **options}, len(log)))
-        return told(Model._of(_thetahat.fit(handle("log", chosen), json.dumps({**known, **given}))), stacklevel=4)
+        return told(Model._of(_thetahat.fit(handle("log", chosen), json.dumps({**known, **given}))))
     if isinstance(log, Log) and len(log.outputs) > 1 and not log.inputs:
         *others, last = log.outputs
         raise ValueError(
@@ -517,11 +517,11 @@ def search(
 def fitted(log: Log, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
     """A fit by one of the functions that users call: with its own arguments and its options."""
     data = handle("log", log)
-    return told(Model._of(_thetahat.fit(data, _options.plan({**own, **options}, len(log)))), stacklevel=5)
+    return told(Model._of(_thetahat.fit(data, _options.plan({**own, **options}, len(log)))))
 
 
-def told(model: Model, stacklevel: int) -> Model:
+def told(model: Model) -> Model:
     """A model of whose warnings the caller is told."""
     for warning in model._model.warnings():
-        _said.warn(warning, EstimationWarning, stacklevel=stacklevel)
+        _said.warn(warning, EstimationWarning)
     return model

@@ -401,4 +401,4 @@ def grey(
     """
     box = model if isinstance(model, GreyBox) else GreyBox(model)
     data = handle("log", log)
-    return told(Model._of(_thetahat.fit_equations(data, box._model, _options.plan(options, len(log)))), stacklevel=4)
+    return told(Model._of(_thetahat.fit_equations(data, box._model, _options.plan(options, len(log)))))

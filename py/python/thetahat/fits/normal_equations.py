@@ -239,7 +239,7 @@ class NormalEquations:
         """
         solved = Model._of(self._sums.solve())
         for warning in solved._model.warnings():
-            _said.warn(warning, EstimationWarning, stacklevel=2)
+            _said.warn(warning, EstimationWarning)
         return solved
 
     @property

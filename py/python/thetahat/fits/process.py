@@ -148,4 +148,4 @@ def _fitted(log: Log | MeasuredResponse, own: Mapping[str, Any], options: Mappin
         found = Model._of(_thetahat.fit_response(log.to_json(), _options.plan({**own, **options})))
     else:
         found = Model._of(_thetahat.fit(handle("log", log), _options.plan({**own, **options}, len(log))))
-    return told(found, stacklevel=5)
+    return told(found)

@@ -190,7 +190,7 @@ def _read(
     if outputs is not None and len(outputs) > 1:
         log = log.select([] if inputs is None else names_of("inputs", inputs), outputs)
     for note in notes:
-        _said.warn(note, stacklevel=3)
+        _said.warn(note)
     time, start = log.clock
     said = "assumed" if time is None and options.get("sample_time") is None else "" if time is None else f"by column {time!r}"
     said = said if options.get("resample") is None else f"{said}, resampled"

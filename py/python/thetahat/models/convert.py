@@ -151,6 +151,51 @@ def response_to_control(
     )
 
 
+def with_pade(
+    matrices: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], delays: ArrayLike, order: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """A, B, C and D with Padé's approximation of the dead time of each input in front of it.
+
+    e^(-s T) = sum_k c_k (-s T)^k / sum_k c_k (s T)^k, c_k = (2 n - k)! n! / ((2 n)! k! (n - k)!): all-pass, and right to the power
+    2 n of s T (Golub and Van Loan, Matrix Computations, 4th ed. 2013, section 9.3.1). In the states of a companion form of s T.
+
+    Parameters
+    ----------
+    matrices : tuple of ndarray
+        A, B, C and D in continuous time.
+    delays : array_like, shape (inputs,)
+        Seconds.
+    order : int
+        n.
+    """
+    a, b, c, d = matrices
+    coefficients = np.ones(order + 1)
+    for k in range(1, order + 1):
+        coefficients[k] = coefficients[k - 1] * (order - k + 1) / ((2 * order - k + 1) * k)
+    signs = (-1.0) ** np.arange(order + 1)
+    # Monic in falling powers of s T.
+    below = coefficients[::-1] / coefficients[-1]
+    above = (coefficients * signs)[::-1] / coefficients[-1]
+    for place, delay in enumerate(np.asarray(delays, dtype=np.float64)):
+        if delay == 0:
+            continue
+        state = np.zeros((order, order))
+        state[0] = -below[1:]
+        state[1:, :-1] += np.eye(order - 1)
+        state /= delay
+        drive = np.zeros((order, 1))
+        drive[0] = 1.0 / delay
+        seen = (above[1:] - above[0] * below[1:])[np.newaxis]
+        moved, acts = b[:, [place]].copy(), d[:, [place]].copy()
+        b, d = b.copy(), d.copy()
+        b[:, [place]], d[:, [place]] = moved * above[0], acts * above[0]
+        a = np.block([[a, moved @ seen], [np.zeros((order, a.shape[0])), state]])
+        b = np.vstack([b, np.zeros((order, b.shape[1]))])
+        b[-order:, [place]] = drive
+        c = np.hstack([c, acts @ seen])
+    return a, b, c, d
+
+
 def state_space_to_scipy(F: ArrayLike, G: ArrayLike, H: ArrayLike, D: ArrayLike, sample_time: float | None) -> Any:
     """A state space from the inputs to the outputs, for ``scipy.signal``.
 

@@ -41,7 +41,8 @@ class ConvertibleModel(ReportedModel):
         >>> th.arx(th.dc_motor(), na=2, nb=2).to_state_space().F.shape
         (2, 2)
         """
-        matrices = self._model.state_space()
+        sampled = self._model if self.kind != "process" else self._model.converted(repr(self.sample_time), None)
+        matrices = sampled.state_space()
         return StateSpace(*matrices, self.noise_covariance, self.sample_time, self.inputs, self.outputs)
 
     def hankel_singular_values(self) -> Array:
@@ -179,7 +180,7 @@ class ConvertibleModel(ReportedModel):
         words.append(f"model_{what}" if name is None else _options.text("name", name))
         files, found = self._model.exported(words, None if log is None else handle("log", log))
         for warning in found:
-            _said.warn(warning, EstimationWarning, stacklevel=2)
+            _said.warn(warning, EstimationWarning)
         if folder is not None:
             place = _files.name(folder)
             os.makedirs(place, exist_ok=True)
@@ -187,44 +188,78 @@ class ConvertibleModel(ReportedModel):
                 _thetahat.write(os.path.join(place, file), text)
         return dict(files)
 
-    def to_scipy(self) -> Any:
-        """The plant as a discrete transfer function of SciPy; of several inputs, a list of them.
+    def to_scipy(self, *, pade: int | None = None) -> Any:
+        """The plant as a system of SciPy, in deviations from the offsets.
+
+        Parameters
+        ----------
+        pade : int, optional
+            The order of Padé's approximation of dead times in continuous time, which SciPy's systems cannot have.
 
         Returns
         -------
-        scipy.signal.dlti, or a list of them
-            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices, in continuous time a
-            `scipy.signal.lti`.
-        """
-        if self.kind == "continuous-state-space":
-            return _convert.state_space_to_scipy(*self._continuous_matrices(), None)
-        if self.kind == "state-space":
-            return self.to_state_space().to_scipy()
-        return _convert.to_scipy(self.b, self._denominators(), self.sample_time)
+        scipy.signal.dlti or scipy.signal.lti
+            Of polynomials with one input the transfer function B/(A F), else a state space; in continuous time an ``lti``.
 
-    def to_control(self) -> Any:
-        """The plant for python-control, with inputs and outputs by name.
+        Raises
+        ------
+        ValueError
+            For a dead time without ``pade``, and a model that is not linear.
+        """
+        if self.kind == "polynomial" and len(self.inputs) == 1:
+            return _convert.to_scipy(self.b, self._denominators(), self.sample_time)
+        return _convert.state_space_to_scipy(*self._plant(pade))
+
+    def to_control(self, *, pade: int | None = None) -> Any:
+        """The plant for python-control, in deviations from the offsets, with inputs and outputs by name.
+
+        Parameters
+        ----------
+        pade : int, optional
+            The order of Padé's approximation of dead times in continuous time, which python-control does not have.
 
         Returns
         -------
         control.TransferFunction or control.StateSpace
-            B/(A F) of each input, in deviations from the offsets; of a model in state space its matrices, in continuous time with ``dt``
-            0.
-        """
-        if self.kind == "continuous-state-space":
-            return _convert.state_space_to_control(*self._continuous_matrices(), None, self.inputs, self.outputs)
-        if self.kind == "state-space":
-            return self.to_state_space().to_control()
-        return _convert.to_control(self.b, self._denominators(), self.sample_time, self.inputs, self.output)
+            Of polynomials with one input the transfer function B/(A F), else a state space, which needs no Slycot; in continuous time with
+            ``dt`` 0.
 
-    def _continuous_matrices(self) -> tuple[Array, Array, Array, Array]:
-        own = self._own
-        if any(own["delays"]):
-            raise ValueError("the model has a delay, which matrices in continuous time cannot have; take converted(seconds)")
+        Raises
+        ------
+        ValueError
+            For a dead time without ``pade``, and a model that is not linear.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.Model.from_transfer_function([3], [10, 1], delay=2)
+        >>> system = model.to_control(pade=3)
+        >>> system.nstates, round(float(system.dcgain()), 6)
+        (4, 3.0)
+        """
+        if self.kind == "polynomial" and len(self.inputs) == 1:
+            return _convert.to_control(self.b, self._denominators(), self.sample_time, self.inputs, self.output)
+        return _convert.state_space_to_control(*self._plant(pade), self.inputs, self.outputs)
+
+    def _plant(self, pade: int | None) -> tuple[Array, Array, Array, Array, float | None]:
+        """The matrices from the inputs to the outputs, and the sample time; none in continuous time."""
+        if self.kind in ("continuous-state-space", "process"):
+            return (*self._continuous_matrices(pade), None)
+        found = self.to_state_space()
+        return found.F, found.G, found.H, found.D, self.sample_time
+
+    def _continuous_matrices(self, pade: int | None) -> tuple[Array, Array, Array, Array]:
+        own = self._in_states
         order, inputs, outputs = len(own["a"]), len(self.inputs), len(self.outputs)
         shapes = {"a": (order, order), "b": (order, inputs), "c": (outputs, order), "d": (outputs, inputs)}
         a, b, c, d = (np.reshape(np.array(own[name], dtype=np.float64), shape) for name, shape in shapes.items())
-        return a, b, c, d
+        if not any(own["delays"]):
+            return a, b, c, d
+        if pade is None:
+            raise ValueError(
+                "the model has a dead time, which matrices in continuous time cannot have: pade=3 approximates it, converted(seconds) samples it"
+            )
+        return _convert.with_pade((a, b, c, d), own["delays"], _options.count("pade", pade, 20))
 
     def _denominators(self) -> list[Array]:
         return [np.convolve(self.a, f) for f in self.f]

@@ -18,6 +18,7 @@ from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import ValidationOptions
 from thetahat.logs.log import Log, handle
 from thetahat.models.forms import ConvertibleModel
+from thetahat.models.known import KnownModels
 from thetahat.models.responses import Forecast, FrequencyResponse, TransientResponse
 from thetahat.models.validation import Validation
 
@@ -27,14 +28,15 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-class Model(ConvertibleModel):
+class Model(ConvertibleModel, KnownModels):
     """An estimated model, A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t), and the report of its fit.
 
     Polynomials are written in rising powers of q^-1, which delays by one sample: ``b[j][i]`` multiplies u_j(t - i). Signals
     go in and come out in the units of the log; the offsets that were removed before the fit are part of the model.
 
-    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `process`, `iv`, `sriv`, `search` and `from_json`. They do not
-    change; they pickle and copy.
+    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `process`, `iv`, `sriv`, `search` and `from_json`; of numbers that
+    are known by `from_polynomials`, `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy`. They do not change; they
+    pickle and copy.
 
     Examples
     --------
@@ -198,7 +200,7 @@ class Model(ConvertibleModel):
             values, kept = self._model.clamped_run(None, self._inputs_of(u), initial)
         if kept:
             message = f"{kept} values were kept within 1.1 times the range of the estimation rows"
-            _said.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning)
         return _beside(values)
 
     def sample(
@@ -255,10 +257,10 @@ class Model(ConvertibleModel):
             runs, unstable, varied = self._model.sample(None, self._inputs_of(u), draws, seed, "zero")
         if not varied:
             message = "the covariance of the parameters is not known: the runs differ in their noise alone"
-            _said.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning)
         if unstable:
             message = f"parameters of an unstable model were drawn {unstable} times, and drawn again"
-            _said.warn(message, EstimationWarning, stacklevel=2)
+            _said.warn(message, EstimationWarning)
         return runs
 
     def forecast(

@@ -104,6 +104,17 @@ class ReportedModel:
     def _estimation(self) -> dict[str, Any]:
         return self._parts[1]
 
+    @cached_property
+    def _states(self) -> _thetahat.Model:
+        """The model in state space, if it is not in polynomials: a process in continuous time."""
+        return self._model.converted("continuous", None) if self.kind == "process" else self._model
+
+    @cached_property
+    def _in_states(self) -> dict[str, Any]:
+        """Its document."""
+        own: dict[str, Any] = json.loads(self._states.parts()[0])
+        return own
+
     @property
     def name(self) -> str:
         """Structure and orders, such as ``ARX(2, 2, 1)``; of equations how many states they have."""
@@ -115,8 +126,10 @@ class ReportedModel:
         return str(self._own["kind"])
 
     def _polynomial(self, name: str) -> Any:
-        """A part that only models of polynomials have; of those in state space what follows from its poles."""
+        """A part that only models of polynomials have; of those in state space, and of processes, what follows from its poles."""
         shared = ("stable", "poles", "time_constants", "dc_gain")
+        if self.kind == "process" and name in shared:
+            return self._in_states[name]
         if name not in self._own or (self.kind in _STATES and name not in shared):
             kind = {
                 "equations": "in equations",
@@ -254,12 +267,67 @@ class ReportedModel:
         return bool(self._polynomial("stable"))
 
     def poles(self) -> npt.NDArray[np.complex128]:
-        """The roots of A and of each F in the z plane; in state space the eigenvalues of F, in continuous time of A."""
+        """The roots of A and of each F in the z plane; in state space the eigenvalues of F, in continuous time of A, and of a process what
+        its time constants say."""
         return _roots(self._polynomial("poles"))
 
-    def zeros(self, input: int | str = 0) -> npt.NDArray[np.complex128]:
-        """The finite roots of an input's B in the z plane."""
-        return _roots(self._polynomial("zeros")[self._input(input)])
+    def zeros(self, input: int | str = 0, *, output: int | str | None = None) -> npt.NDArray[np.complex128]:
+        """The finite zeros from an input to an output: of polynomials the roots of B in the z plane, in continuous time in the s plane."""
+        if self.kind == "polynomial":
+            return _roots(self._own["zeros"][self._input(input)])
+        zeros, _, _ = self._transfer("zeros", input, output)
+        return zeros
+
+    def num(self, input: int | str = 0, *, output: int | str | None = None) -> Array:
+        """The numerator from an input to an output, in falling powers of z, in continuous time of s; `den` is the denominator.
+
+        Of a model in continuous time without its delay, see `delays`.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.Model.from_transfer_function([3], [10, 1], delay=2)
+        >>> model.num(), model.den(), model.delays
+        (array([0.3]), array([1. , 0.1]), array([2.]))
+        """
+        return self._quotient("num", input, output)[0]
+
+    def den(self, input: int | str = 0, *, output: int | str | None = None) -> Array:
+        """The denominator from an input to an output, monic, in falling powers of z, in continuous time of s."""
+        return self._quotient("den", input, output)[1]
+
+    @property
+    def delays(self) -> Array:
+        """What each input waits, in seconds: of a model in continuous time its dead time, of a sampled one samples that only delay."""
+        if self.kind == "polynomial":
+            return np.array([max(0, delay - 1) * self.sample_time for delay in self.orders["nk"]])
+        own = self._in_states
+        if "delays" not in own:
+            raise AttributeError(f"delays are of linear models, and this one is {self.name}")
+        factor = 1.0 if self.kind in ("process", "continuous-state-space") else self.sample_time
+        return np.array(own["delays"], dtype=np.float64) * factor
+
+    def _quotient(self, name: str, input: int | str, output: int | str | None) -> tuple[Array, Array]:
+        """Numerator and denominator in falling powers."""
+        if self.kind == "polynomial":
+            place = self._input(input)
+            self._output(output)
+            above, below = self.b[place], np.convolve(self.a, self.f[place])
+            length = max(len(above), len(below))
+            padded = [np.pad(values, (0, length - len(values))) for values in (above, below)]
+            return np.trim_zeros(padded[0], "f"), padded[1]
+        zeros, poles, gain = self._transfer(name, input, output)
+        return np.real(gain * np.atleast_1d(np.poly(zeros))), np.real(np.atleast_1d(np.poly(poles)))
+
+    def _transfer(
+        self, name: str, input: int | str, output: int | str | None
+    ) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128], float]:
+        """Zeros, poles and gain from an input to an output."""
+        if self.kind not in (*_STATES, "process"):
+            raise AttributeError(f"{name} is of linear models, and this one is {self.name}")
+        zeros, poles, gain = self._model.transfer(self._output(output), self._input(input))
+        complexes = [np.array([complex(*root) for root in roots], dtype=np.complex128) for roots in (zeros, poles)]
+        return complexes[0], complexes[1], gain
 
     def noise_poles(self) -> npt.NDArray[np.complex128]:
         """The roots of D: what the noise has beside the roots of A."""
@@ -287,7 +355,7 @@ class ReportedModel:
 
     def _gain(self, input: int | str, output: int | str | None) -> dict[str, Any] | None:
         gains, place = self._polynomial("dc_gain"), self._output(output)
-        found: dict[str, Any] | None = (gains[place] if self.kind in _STATES else gains)[self._input(input)]
+        found: dict[str, Any] | None = (gains if self.kind == "polynomial" else gains[place])[self._input(input)]
         return found
 
     def dc_gain_interval(self, input: int | str = 0, *, output: int | str | None = None) -> Array:

@@ -20,7 +20,9 @@ const NO_ERROR: &str = "no time constant goes with a pole that does not decay, a
 pub(super) fn present(on: &mut Sections, report: &Report, model: &ContinuousStateSpaceModel) {
     on.section("Model");
     let (name, step) = (report.model.name(), seconds(model.sample_time));
-    on.line(format!("{name}, from a sample time of {step} with {}", model.hold));
+    let given = report.estimation.procedure.is_given();
+    let from = if given { "responses in steps of" } else { "from a sample time of" };
+    on.line(format!("{name}, {from} {step} with {}", model.hold));
     on.line("dx/dt = A x + B u + K e, y = C x + D u + e");
     let inputs = model.inputs.iter().zip(&model.delays).map(|(input, delay)| {
         let waits = if *delay > 0.0 { format!(", delay {}", seconds(*delay)) } else { String::new() };
@@ -28,6 +30,9 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &ContinuousStat
     });
     let outputs = model.outputs.iter().map(|output| signal("output", output));
     on.line(inputs.chain(outputs).collect::<Vec<String>>().join(", "));
+    if given && !on.is_page() {
+        procedure(on, report);
+    }
     on.gap();
     poles(on, model);
     gains(on, (&model.inputs, &model.outputs), &model.dc_gain);
@@ -35,9 +40,11 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &ContinuousStat
     on.line(stable(model.stable));
     if on.is_page() {
         let estimation = &report.estimation;
-        on.line(format!("{} samples", estimation.samples));
-        mean_square(on, estimation);
-        on.line(criteria(&estimation.criteria));
+        if !estimation.procedure.is_given() {
+            on.line(format!("{} samples", estimation.samples));
+            mean_square(on, estimation);
+            on.line(criteria(&estimation.criteria));
+        }
         procedure(on, report);
         responses(on, report, false);
     }

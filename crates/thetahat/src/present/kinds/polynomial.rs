@@ -20,7 +20,8 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &PolynomialMode
     on.line(format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));
     signals(on, &model.inputs, std::slice::from_ref(&model.output));
     on.gap();
-    on.table(parameters(&model.parameters));
+    let given = report.estimation.procedure.is_given();
+    on.table(parameters(&model.parameters).without(if given { &[2] } else { &[] }));
     samples(on, &report.estimation, model.noise_variance, &model.output);
     procedure(on, report);
     on.gap();

@@ -20,6 +20,10 @@ const MOST: usize = 8;
 
 /// The samples, the noise, the level and slope of the output, and the criteria.
 pub(super) fn samples(on: &mut Sections, estimation: &Estimation, noise_variance: f64, output: &Signal) {
+    if estimation.procedure.is_given() {
+        on.line(format!("noise variance {}", number(noise_variance)));
+        return;
+    }
     on.line(format!(
         "{} samples, noise variance {}, condition number {}",
         estimation.samples,
@@ -34,6 +38,10 @@ pub(super) fn samples(on: &mut Sections, estimation: &Estimation, noise_variance
         on.line(format!("operating point of '{}': {}{slope}", harmless(&output.name), quantity(level)));
     }
     on.line(criteria(&estimation.criteria));
+}
+
+fn given(on: &mut Sections) {
+    on.line("The numbers were given, and nothing was estimated.");
 }
 
 /// How the parameters of a model were found.
@@ -101,6 +109,7 @@ pub(super) fn procedure(on: &mut Sections, report: &Report) {
                 initial(start, search.initial_conditions)
             ));
         }
+        Procedure::Given => given(on),
         // A text says of a model that was made of another one what it is, not how that was found.
         _ if matches!(report.model, Model::Polynomial(_)) && !on.is_page() => {}
         Procedure::InnovationsLikelihood(found) => {

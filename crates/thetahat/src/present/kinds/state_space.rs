@@ -42,7 +42,7 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &StateSpaceMode
     }
     if is_fit {
         let (subspace, vector_arx) = (estimation.procedure.subspace(), estimation.procedure.vector_arx());
-        if subspace.is_some() || vector_arx.is_some() || on.is_page() {
+        if subspace.is_some() || vector_arx.is_some() || estimation.procedure.is_given() || on.is_page() {
             procedure(on, report);
         }
         if let Some(outcome) = subspace {
@@ -56,9 +56,11 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &StateSpaceMode
                 coefficients(on, outcome, model);
             }
         }
-        on.line(format!("{} samples, {} free parameters", estimation.samples, model.free_parameters));
-        mean_square(on, estimation);
-        on.line(criteria(&estimation.criteria));
+        if !estimation.procedure.is_given() {
+            on.line(format!("{} samples, {} free parameters", estimation.samples, model.free_parameters));
+            mean_square(on, estimation);
+            on.line(criteria(&estimation.criteria));
+        }
     }
     on.gap();
     on.section("Poles");

@@ -102,7 +102,7 @@ impl Model {
             Self::ContinuousStateSpace(_) => {
                 Err(Error::argument("to", "the model is in continuous time already; give a sample time"))
             }
-            _ => {
+            Self::Polynomial(_) | Self::StateSpace(_) | Self::Equations(_) | Self::NonlinearArx(_) => {
                 let plant = self.plant()?;
                 let seconds = plant.matrices.sample_time;
                 let head = Head {
@@ -146,7 +146,9 @@ impl Model {
                 let hold = hold.unwrap_or_default();
                 return model.in_state_space(hold)?.sampled(seconds, hold);
             }
-            _ => hold.unwrap_or_default(),
+            Self::Polynomial(_) | Self::StateSpace(_) | Self::Equations(_) | Self::NonlinearArx(_) => {
+                hold.unwrap_or_default()
+            }
         };
         let Plant { matrices, delays, free_parameters, degrees_of_freedom } = self.plant()?;
         let signals = || (self.inputs().to_vec(), self.outputs().to_vec());
@@ -203,7 +205,9 @@ impl Model {
                 let plant = |whole: StateSpace| stripped(whole, &model.delays).0;
                 Some(pairs.into_iter().map(|pair| pair.map(plant)).collect())
             }
-            _ => None,
+            Self::Process(_) | Self::ContinuousStateSpace(_) | Self::Equations(_) | Self::NonlinearArx(_) => {
+                None
+            }
         }
     }
 

@@ -148,7 +148,7 @@ fn a_field_that_is_missing() {
     for field in ["a", "b", "orders", "inputs", "outputs", "sample_time"] {
         let mut report = whole.clone();
         report["model"].as_object_mut().unwrap().remove(field);
-        refused(report.to_string(), 3, &["model.json: ", &format!("`{field}`")]);
+        refused(report.to_string(), 3, &["model.json: ", &format!("'{field}'")]);
     }
 }
 

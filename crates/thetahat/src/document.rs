@@ -95,6 +95,8 @@ pub(crate) fn to_json<D: Document>(document: &D) -> Result<String, Error> {
 
 pub(crate) fn from_json<D: Document>(text: &str) -> Result<D, Error> {
     let malformed = |error: serde_json::Error| {
+        // Fields of a document are no options, which stand between backticks.
+        let error = error.to_string().replace('`', "'");
         Error::report(format!("this is not a thetahat {}: {error}; {}", D::NAME, D::REMEDY))
     };
     let schema = schema(text).map_err(malformed)?;

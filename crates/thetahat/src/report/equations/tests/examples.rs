@@ -210,7 +210,7 @@ fn reports_go_there_and_back() {
 
     for (changed, words) in [
         (text.replace("thetahat.report/1", "thetahat.report/2"), "its schema is 'thetahat.report/2'"),
-        (text.replace("\"equations\":", "\"equation\":"), "missing field `equations`"),
+        (text.replace("\"equations\":", "\"equation\":"), "missing field 'equations'"),
         (text.replace("\"friction\"", "\"torque_constant\""), "model.equations: "),
         ("t,u\n".to_owned(), "not a thetahat report"),
     ] {

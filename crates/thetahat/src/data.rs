@@ -40,6 +40,7 @@ mod regular;
 mod resample;
 mod source;
 mod split;
+mod steps;
 #[cfg(test)]
 mod tests;
 
@@ -48,7 +49,7 @@ pub(crate) use digest::{digest, digests, inside, text_digest};
 pub use finding::{Decision, Finding, FindingKind};
 pub use joint_record::JointRecord;
 pub use log::{Channel, Interpolation, Log};
-pub(crate) use log::{GAP, JITTER, check, gap_above, gap_of, measured};
+pub(crate) use log::{check, measured};
 pub use mend::{Calendar, Mended, mended};
 pub use offset::Offset;
 pub(crate) use padding::Padding;
@@ -62,3 +63,4 @@ pub use resample::{AntiAlias, Resample, Resampling};
 pub use source::Source;
 pub use split::{Rows, Split};
 pub(crate) use split::{between, checked};
+pub(crate) use steps::{GAP, JITTER, gap_above, gap_of};

@@ -10,7 +10,7 @@
 //!
 //! Everything else is an error that says what was seen.
 
-use super::log::runs_forward;
+use super::steps::runs_forward;
 use crate::Error;
 use crate::figures::short;
 

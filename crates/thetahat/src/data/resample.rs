@@ -28,8 +28,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thetahat_numerics::regression::product;
 
-use super::log::{check, gap_above, median_step, steps};
+use super::log::check;
 use super::regular::coarser;
+use super::steps::{gap_above, median_step, steps};
 use super::{Channel, GAP, Interpolation, JITTER, Log};
 use crate::Error;
 use crate::figures::short;

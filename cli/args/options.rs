@@ -12,45 +12,6 @@ use super::Names;
 use crate::failure::Failure;
 use crate::options::with_options;
 
-/// Values of these may begin with a hyphen.
-const MAY_BE_NEGATIVE: [&str; 35] = [
-    "a",
-    "alarm",
-    "alpha",
-    "alphas",
-    "b",
-    "band",
-    "c",
-    "d",
-    "dc_gain",
-    "dead_zone",
-    "delay",
-    "den",
-    "f",
-    "feedthrough_matrix",
-    "frequencies",
-    "horizon",
-    "input_matrix",
-    "noise_bound",
-    "noise_covariance",
-    "noise_gain",
-    "norm",
-    "num",
-    "output_matrix",
-    "prefilter",
-    "range",
-    "regressor",
-    "ridge",
-    "rms",
-    "sample_time",
-    "split",
-    "state_matrix",
-    "step",
-    "time_limit",
-    "tolerance",
-    "width",
-];
-
 /// Those of a table that were given, as JSON.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct OptionArguments<O>(Map<String, Value>, PhantomData<O>);
@@ -108,7 +69,7 @@ fn argument(option: &OptionRow) -> Arg {
     if option.form == Form::Flag {
         return own.action(ArgAction::SetTrue);
     }
-    let own = own.value_name(option.notation).allow_hyphen_values(MAY_BE_NEGATIVE.contains(&option.field));
+    let own = own.value_name(option.notation).allow_hyphen_values(option.signed);
     let own = match option.form {
         Form::Flag => own,
         Form::Single => own.action(ArgAction::Set),

@@ -22,6 +22,8 @@ pub struct OptionRow {
     pub kinds: &'static [Kind],
     /// How often it may be given, and what its value is.
     pub form: Form,
+    /// Whether its value may begin with a minus sign.
+    pub signed: bool,
     /// The values that it may have, where that is a list.
     pub words: fn() -> Vec<Word>,
     /// The type of its value in Python; empty: one of the words.
@@ -128,6 +130,7 @@ macro_rules! options {
                 heading: $heading,
                 kinds: &[$($($of),+)?],
                 form: <$kind as $crate::options::OptionValue>::FORM,
+                signed: <$kind as $crate::options::OptionValue>::SIGNED,
                 words: <$kind as $crate::options::OptionValue>::words,
                 python: <$kind as $crate::options::OptionValue>::PYTHON,
                 schema: <$kind as $crate::options::OptionValue>::schema,

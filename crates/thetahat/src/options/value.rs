@@ -34,6 +34,8 @@ pub(crate) trait OptionValue: Default {
     const FORM: Form;
     /// Its type in Python.
     const PYTHON: &'static str;
+    /// Whether it may begin with a minus sign.
+    const SIGNED: bool;
     /// What it may be, where that is a list.
     fn words() -> Vec<Word>;
     /// Whether it was given.
@@ -66,6 +68,8 @@ pub(crate) trait OptionText: Sized {
     const PYTHON: &'static str;
     /// The type of a list of them.
     const PYTHON_LIST: &'static str = "Sequence[str]";
+    /// Whether it may begin with a minus sign.
+    const SIGNED: bool = false;
     fn words() -> Vec<Word> {
         Vec::new()
     }
@@ -77,6 +81,7 @@ pub(crate) trait OptionText: Sized {
 impl OptionValue for bool {
     const FORM: Form = Form::Flag;
     const PYTHON: &'static str = "bool";
+    const SIGNED: bool = false;
 
     fn words() -> Vec<Word> {
         Vec::new()
@@ -98,6 +103,7 @@ impl OptionValue for bool {
 impl<T: OptionText> OptionValue for Option<T> {
     const FORM: Form = Form::Single;
     const PYTHON: &'static str = T::PYTHON;
+    const SIGNED: bool = T::SIGNED;
 
     fn words() -> Vec<Word> {
         T::words()
@@ -119,6 +125,7 @@ impl<T: OptionText> OptionValue for Option<T> {
 impl<T: OptionText> OptionValue for Vec<T> {
     const FORM: Form = T::LIST;
     const PYTHON: &'static str = T::PYTHON_LIST;
+    const SIGNED: bool = T::SIGNED;
 
     fn words() -> Vec<Word> {
         T::words()
@@ -189,6 +196,7 @@ fn plain(text: &str) -> Value {
 impl OptionText for String {
     const LIST: Form = Form::Repeated;
     const PYTHON: &'static str = "str";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         Ok(text.to_owned())
@@ -253,6 +261,7 @@ impl OptionText for f64 {
     const LIST: Form = Form::List;
     const PYTHON: &'static str = "float";
     const PYTHON_LIST: &'static str = "Sequence[float]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let number = text.trim().parse().ok().filter(|number: &f64| number.is_finite());
@@ -270,6 +279,7 @@ pub struct Ends(pub [f64; 2]);
 
 impl OptionText for Ends {
     const PYTHON: &'static str = "tuple[float, float]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|end| end.is_finite());
@@ -309,11 +319,13 @@ impl OptionText for NamedValue {
 
 /// Values that read and write themselves, how a list of them stands on a command line, and their types in Python.
 macro_rules! texts {
-    ($($own:ty, $list:ident, $python:literal, $python_list:literal;)*) => {$(
+    (signed) => { true };
+    ($($own:ty, $list:ident, $python:literal, $python_list:literal $(, $signed:ident)?;)*) => {$(
         impl $crate::options::OptionText for $own {
             const LIST: $crate::options::Form = $crate::options::Form::$list;
             const PYTHON: &'static str = $python;
             const PYTHON_LIST: &'static str = $python_list;
+            $(const SIGNED: bool = $crate::options::texts!($signed);)?
 
             fn of(text: &str) -> Result<Self, String> {
                 text.parse().map_err(|error| match error {

@@ -263,6 +263,7 @@ pub enum NormOption {
 
 impl OptionText for NormOption {
     const PYTHON: &'static str = "Union[float, Literal[\"huber\", \"inf\"], str]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let k = |text: &str| text.trim().parse().ok().filter(|k: &f64| k.is_finite() && *k > 0.0);
@@ -297,6 +298,7 @@ pub struct StepOption {
 
 impl OptionText for StepOption {
     const PYTHON: &'static str = "Union[float, tuple[float, float]]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let number =
@@ -341,12 +343,12 @@ impl OptionText for DelayRange {
 texts! {
     Bound, Repeated, "str", "Mapping[str, Bound]";
     Focus, Repeated, "Union[int, Literal[\"auto\", \"prediction\", \"simulation\"]]", "Sequence[str]";
-    GainBound, Repeated, "str", "Union[Bound, Mapping[str, Bound]]";
+    GainBound, Repeated, "str", "Union[Bound, Mapping[str, Bound]]", signed;
     OrderRange, List, "Order", "Orders";
-    Prefilter, Repeated, "Band", "Sequence[str]";
+    Prefilter, Repeated, "Band", "Sequence[str]", signed;
     ProcessStructure, List, "str", "Union[str, Sequence[str]]";
     Refine, Repeated, "Literal[\"prediction\", \"simulation\"]", "Sequence[str]";
-    Split, Repeated, "Union[str, tuple[float, float, float]]", "Sequence[str]";
+    Split, Repeated, "Union[str, tuple[float, float, float]]", "Sequence[str]", signed;
     Weighting, Repeated, "Literal[\"ssarx\", \"moesp\", \"n4sid\", \"cva\"]", "Sequence[str]";
 }
 

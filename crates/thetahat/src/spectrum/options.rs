@@ -57,6 +57,7 @@ impl OptionText for FrequencyRange {
     const LIST: crate::options::Form = crate::options::Form::List;
     const PYTHON: &'static str = "float";
     const PYTHON_LIST: &'static str = "Frequencies";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|value| value.is_finite());

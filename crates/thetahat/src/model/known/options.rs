@@ -23,6 +23,7 @@ pub struct Coefficients(pub Vec<f64>);
 impl OptionText for Coefficients {
     const PYTHON: &'static str = "Sequence[float]";
     const PYTHON_LIST: &'static str = "Sequence[Sequence[float]]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let each = text.split(',').map(|one| one.trim().parse().ok().filter(|value: &f64| value.is_finite()));
@@ -44,6 +45,7 @@ pub struct Matrix(pub DMatrix<f64>);
 impl OptionText for Matrix {
     const LIST: Form = Form::Repeated;
     const PYTHON: &'static str = "Sequence[Sequence[float]]";
+    const SIGNED: bool = true;
 
     fn of(text: &str) -> Result<Self, String> {
         let rows: Result<Vec<Vec<f64>>, String> =

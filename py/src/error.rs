@@ -48,6 +48,8 @@ pub(crate) fn online_at(py: Python<'_>, row: usize, error: thetahat_core::Error)
 
 fn stepper(py: Python<'_>, error: thetahat_core::Error, message: String) -> PyErr {
     use thetahat_core::Error;
+    // The method has another name here.
+    let message = message.replace("with log_row", "with update");
     match error {
         Error::NoVariance { .. }
         | Error::RankDeficient { .. }

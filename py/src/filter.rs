@@ -13,7 +13,7 @@ use crate::array::{finite_matrix, matrix, vector};
 use crate::error;
 use crate::grey_box::GreyBox;
 use crate::model::Model;
-use crate::online::argument::{row, sample};
+use crate::online::argument::{reserve, row, sample, shaped};
 use crate::online::innovation::{code, names};
 use crate::online::results::{Column, Results};
 use crate::work::Pulse;
@@ -238,6 +238,27 @@ impl StateFilter {
         sample("y", outputs, y.len(), &mut y)?;
         self.filter.step(seconds, &u, &y).map_err(|error| error::batch(py, error))?;
         self.latest(py)?.ok_or_else(|| PyValueError::new_err("there is no row yet"))
+    }
+
+    /// The outputs of the next rows from their inputs, shape (steps, m); an input that is NaN is held.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        inputs: &Bound<'py, PyAny>,
+        steps: usize,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.filter.model();
+        let (k, m) = (model.inputs().len(), model.outputs().len());
+        let inputs = if k == 0 { None } else { Some(matrix("u", inputs, [Some(steps), Some(k)])?) };
+        let inputs = inputs.as_ref().map_or(Ok(&[][..]), |inputs| inputs.as_slice())?;
+        let (mut filter, missing) = (self.filter.clone(), vec![f64::NAN; m]);
+        let mut outputs = reserve(&[steps, m])?;
+        for at in 0..steps {
+            let estimate = filter.step(None, row(inputs, at, k), &missing);
+            let estimate = estimate.map_err(|error| error::batch(py, error))?;
+            outputs.extend_from_slice(estimate.outputs.values);
+        }
+        shaped(py, outputs, [steps, m])
     }
 
     /// What is known after the latest row.

@@ -11,6 +11,7 @@ mod controller;
 pub(crate) mod detector;
 mod extended;
 pub(crate) mod forgetting;
+mod held;
 pub(crate) mod innovation;
 mod kalman;
 mod least_squares;
@@ -99,7 +100,8 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
             any(Bound::new(py, windowed::WindowedLeastSquares::of(read(kept)?))?.into_any())
         }
         "OutOfSequenceFilter" => {
-            any(Bound::new(py, out_of_sequence::OutOfSequenceFilter { filter: read(kept)? })?.into_any())
+            let (filter, held) = held::Held::read(kept)?;
+            any(Bound::new(py, out_of_sequence::OutOfSequenceFilter { filter, held })?.into_any())
         }
         "SelfTuner" => any(Bound::new(py, self_tuner::SelfTuner { tuner: read(kept)? })?.into_any()),
         "RstController" => any(Bound::new(py, controller::RstController::of(read(kept)?))?.into_any()),
@@ -111,12 +113,17 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "LinearObservation" => {
             any(Bound::new(py, model::LinearObservation { model: read(kept)? })?.into_any())
         }
-        "KalmanFilter" => any(Bound::new(py, kalman::KalmanFilter { filter: read(kept)? })?.into_any()),
+        "KalmanFilter" => {
+            let (filter, held) = held::Held::read(kept)?;
+            any(Bound::new(py, kalman::KalmanFilter { filter, held })?.into_any())
+        }
         "ExtendedKalmanFilter" => {
-            any(Bound::new(py, extended::ExtendedKalmanFilter { filter: read(kept)? })?.into_any())
+            let (filter, held) = held::Held::read(kept)?;
+            any(Bound::new(py, extended::ExtendedKalmanFilter { filter, held })?.into_any())
         }
         "LuenbergerObserver" => {
-            any(Bound::new(py, luenberger::LuenbergerObserver { observer: read(kept)? })?.into_any())
+            let (observer, held) = held::Held::read(kept)?;
+            any(Bound::new(py, luenberger::LuenbergerObserver { observer, held })?.into_any())
         }
         "Alarm" => any(Bound::new(py, detector::Alarm::restore(kept)?)?.into_any()),
         "ChangeDetector" => any(Bound::new(py, detector::ChangeDetector::restore(read(kept)?)?)?.into_any()),

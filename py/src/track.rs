@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyFloat, PyList, PyString, PyTuple};
 use thetahat::Document;
 use thetahat::present::tables;
 use thetahat::track::{PerChannel, TrackOptions};
@@ -12,7 +12,7 @@ use thetahat_cli::{Failure, TrackedRow, Tracking};
 use crate::array::{matrix, vector};
 use crate::error;
 use crate::model::Model;
-use crate::online::argument::{reserve, row};
+use crate::online::argument::{self, reserve, row};
 use crate::online::detector::Alarm;
 use crate::online::forgetting::Memory;
 use crate::online::innovation::{code, names};
@@ -113,14 +113,7 @@ impl Tracker {
             values.extend_from_slice(outputs);
         }
 
-        // What an alarm is of, where there are several ways to forget, and several outputs.
-        let policies = self.policies();
-        let policies: Vec<Option<String>> =
-            if policies.len() == 1 { vec![None] } else { policies.into_iter().map(Some).collect() };
-        let of_output = |index: usize| self.tracking.outputs().get(index % l).filter(|_| l > 1).cloned();
-        let of_alarms: Vec<_> = (0..policies.len() * l)
-            .map(|index| (policies.get(index / l).cloned().flatten(), of_output(index)))
-            .collect();
+        let of_alarms = self.of_alarms();
         let (count, n) = (of_alarms.len(), self.names().len());
         let (flat, deep) = (vec![rows, count], vec![rows, count, n]);
         let mut shapes = [const { Vec::new() }; 8];
@@ -146,16 +139,7 @@ impl Tracker {
                 };
                 let mut seen = |row: &TrackedRow<'_>| {
                     let tracked = &row.tracked;
-                    let known = tracked.variance.is_finite();
-                    let numbers = [
-                        tracked.predicted,
-                        tracked.error,
-                        tracked.variance,
-                        if known { tracked.nis } else { f64::NAN },
-                        tracked.excitation,
-                        row.forecast.unwrap_or(f64::NAN),
-                    ];
-                    for (column, number) in columns.iter_mut().zip(numbers) {
+                    for (column, number) in columns.iter_mut().zip(columns_of(row)) {
                         column.push(&[number]);
                     }
                     columns[6].push(row.tracker.parameters().unwrap_or(&unknown));
@@ -184,6 +168,83 @@ impl Tracker {
         found.set_item("too_large", PyArray1::from_vec(py, too_large))?;
         found.set_item("alarms", PyList::new(py, alarms)?)?;
         Ok(found)
+    }
+
+    /// Takes one row; what each tracker made of it, in the order of `Tracked`: numbers and words of one tracker, arrays
+    /// and lists of several.
+    fn row<'py>(
+        &mut self,
+        py: Python<'py>,
+        y: &Bound<'py, PyAny>,
+        u: Option<&Bound<'py, PyAny>>,
+        time: Option<f64>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let (k, l) = (self.tracking.inputs().len(), self.tracking.outputs().len());
+        let mut values = vec![f64::NAN; k + l];
+        let (inputs, outputs) = values.split_at_mut(k);
+        argument::sample("y", y, l, outputs)?;
+        argument::sample("u", u.unwrap_or(&py.None().into_bound(py)), k, inputs)?;
+        let row = self.tracking.count();
+        if row > 0 && self.tracking.clock().is_some() != time.is_some() {
+            let (before, now) =
+                if time.is_none() { ("had times", "has none") } else { ("had no times", "has one") };
+            let message = format!(
+                "time: the rows before {before}, and this one {now}; give all of them times, or none"
+            );
+            return Err(PyValueError::new_err(message));
+        }
+        if let (Some(time), Some(last)) = (time, self.tracking.last_time())
+            && (row > 0 && time <= last)
+        {
+            let message = format!(
+                "time: the row is {} s before the latest one that was taken; give later rows",
+                last - time
+            );
+            return Err(PyValueError::new_err(message));
+        }
+        let of_alarms = self.of_alarms();
+        let count = of_alarms.len();
+        let mut numbers = [const { Vec::new() }; 6];
+        let (mut actions, mut alarms) = (Vec::with_capacity(count), Vec::new());
+        let mut seen = |row_of: &TrackedRow<'_>| {
+            let tracked = &row_of.tracked;
+            numbers.iter_mut().zip(columns_of(row_of)).for_each(|(column, number)| column.push(number));
+            actions.push(if tracked.too_large { "too large" } else { tracked.action.word() });
+            if let Some(given) = tracked.alarm {
+                let (policy, output) = of_alarms.get(row_of.index).cloned().unwrap_or_default();
+                alarms.push(Alarm::of(given, usize::try_from(row).unwrap_or(usize::MAX), policy, output));
+            }
+        };
+        let clock = if time.is_some() { "time" } else { "" };
+        let taken = self.tracking.row(clock, &values, time, &mut seen);
+        taken.map_err(|failure| error::program(py, &failure))?;
+        let one = |column: &[f64]| match column {
+            [number] => PyFloat::new(py, *number).into_any(),
+            several => PyArray1::from_slice(py, several).into_any(),
+        };
+        let [predicted, errors, variances, nis, excitation, forecasts] =
+            numbers.each_ref().map(|column| one(column));
+        let action = match &actions[..] {
+            [word] => PyString::new(py, word).into_any(),
+            several => PyList::new(py, several)?.into_any(),
+        };
+        let alarms = PyList::new(py, alarms)?.into_any();
+        PyTuple::new(py, [predicted, errors, variances, nis, action, excitation, forecasts, alarms])
+    }
+
+    /// The predictions of the next rows, shape (steps, trackers), from their inputs, or from the latest ones.
+    #[pyo3(signature = (future, steps))]
+    fn predict<'py>(
+        &mut self,
+        py: Python<'py>,
+        future: Option<&Bound<'py, PyAny>>,
+        steps: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let k = self.tracking.inputs().len();
+        let future = future.map(|future| matrix("u", future, [Some(steps), Some(k)])).transpose()?;
+        let future = future.as_ref().map(|future| future.as_slice()).transpose()?;
+        let found = self.tracking.predict(future, steps).map_err(|failure| error::program(py, &failure))?;
+        two_dimensions(py, found)
     }
 
     /// Tells that an unknown number of rows is missing here.
@@ -302,7 +363,26 @@ fn two_dimensions(py: Python<'_>, rows: Vec<Vec<f64>>) -> PyResult<Bound<'_, PyA
     PyArray2::from_vec2(py, &rows).map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
+/// What a tracker made of a row, in the order of `COLUMNS`.
+fn columns_of(row: &TrackedRow<'_>) -> [f64; 6] {
+    let tracked = &row.tracked;
+    let nis = if tracked.variance.is_finite() { tracked.nis } else { f64::NAN };
+    let forecast = row.forecast.unwrap_or(f64::NAN);
+    [tracked.predicted, tracked.error, tracked.variance, nis, tracked.excitation, forecast]
+}
+
 impl Tracker {
+    /// What an alarm of each tracker is of, where there are several ways to forget, and several outputs.
+    fn of_alarms(&self) -> Vec<(Option<String>, Option<String>)> {
+        let (policies, outputs) = (self.policies(), self.tracking.outputs());
+        let several = policies.len() > 1;
+        let of = |policy: &String| {
+            let policy = several.then(|| policy.clone());
+            outputs.iter().map(move |output| (policy.clone(), (outputs.len() > 1).then(|| output.clone())))
+        };
+        policies.iter().flat_map(of).collect()
+    }
+
     /// The trackers of the first way to forget: one for each output.
     fn model(&self) -> impl Iterator<Item = &thetahat::track::Tracker> {
         self.tracking.trackers().iter().take(self.tracking.outputs().len())

@@ -98,7 +98,7 @@ def test_several_outputs_are_watched_by_their_square() -> None:
     assert found and min(found) >= 200 and {alarm.chart for alarm in changes.alarms} == {"variance"}
     filter, loop = th.KalmanFilter(np.zeros(2), np.eye(2)), th.ChangeDetector(1000, 2)
     for row, y in enumerate(measurements):
-        loop.update(filter.correct(observation, y))
+        loop.update(filter.update(y, observation=observation))
         filter.predict(transition)
         np.testing.assert_array_equal(loop.statistics, changes.statistics[row])
     # A filter of one output gives columns, which do as they are.

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import thetahat as th
+
 from thetahat import (
     EstimationError,
     ExtendedKalmanFilter,
@@ -96,7 +98,7 @@ def test_the_nile() -> None:
     loop = KalmanFilter([0.0], [[1e7]])
     total = 0.0
     for flow in NILE:
-        total += loop.correct(LEVEL, flow).log_likelihood
+        total += loop.update(flow, observation=LEVEL).log_likelihood
         loop.predict(WALK)
     assert total == trajectory.log_likelihood
 
@@ -147,7 +149,7 @@ def test_steps_in_a_loop_and_run_give_the_same_bits() -> None:
     for k, (y, u) in enumerate(zip(measurements, inputs)):
         np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
         np.testing.assert_array_equal(trajectory.predicted_covariances[k], loop.covariance)
-        innovation = loop.correct(observation, y)
+        innovation = loop.update(y, observation=observation)
         np.testing.assert_array_equal(trajectory.errors[k], innovation.error)
         np.testing.assert_array_equal(trajectory.variances[k], innovation.variance)
         assert trajectory.nis[k] == innovation.nis
@@ -180,7 +182,7 @@ def test_every_size_gives_the_same_bits(n: int, m: int, correlated: bool) -> Non
     for k, (y, u) in enumerate(zip(measurements, inputs.tolist())):
         np.testing.assert_array_equal(trajectory.predicted_states[k], loop.state)
         np.testing.assert_array_equal(trajectory.predicted_covariances[k], loop.covariance)
-        innovation = loop.correct(observation, y)
+        innovation = loop.update(y, observation=observation)
         likelihood += innovation.log_likelihood
         np.testing.assert_array_equal(trajectory.errors[k], innovation.error)
         np.testing.assert_array_equal(trajectory.variances[k], innovation.variance)
@@ -241,7 +243,7 @@ def test_correlated_noises() -> None:
     model, output = LinearTransition([[0.5]], [[1.0]]), LinearObservation([[1.0]], [[1.0]])
     loop, run = KalmanFilter([0.0], [[0.0]]), KalmanFilter([0.0], [[0.0]])
     for y in (1.0, 2.0):
-        loop.correct(output, y)
+        loop.update(y, observation=output)
         loop.predict_correlated(model, output, [[1.0]], y)
     run.run(model, output, [1.0, 2.0], cross_covariance=[[1.0]])
     assert loop.state[0] == run.state[0] == 1.5 and loop.covariance[0, 0] == 0.0
@@ -267,7 +269,7 @@ def test_numerical_and_given_jacobians_agree(iterations: int) -> None:
     np.testing.assert_allclose(one.filtered_covariances, two.filtered_covariances, rtol=1e-6, atol=1e-12)
     loop = ExtendedKalmanFilter(*prior, iterations=iterations)
     for value in y.tolist():
-        loop.correct(numerical[1], value)
+        loop.update(value, observation=numerical[1])
         loop.predict(numerical[0])
     assert pickle.dumps(loop) == pickle.dumps(first)
 
@@ -331,10 +333,10 @@ def test_a_failed_step_changes_nothing_and_a_run_names_the_row() -> None:
         (lambda: filter.run(MOTION, POSITION, np.ones((5, 2))), r"measurements: expected shape \(any, 1\)"),
         (lambda: filter.run(MOTION, POSITION, []), "measurements: expected at least one"),
         (lambda: filter.run(MOTION, POSITION, [1.0], inputs=[1.0]), "inputs: expected None"),
-        (lambda: filter.correct(POSITION, [1.0, 2.0]), "measurement: expected 1 entry"),
-        (lambda: filter.correct(POSITION, np.inf), "measurement is infinite"),
-        (lambda: filter.correct(POSITION, 1.0, input=1.0), "input: expected 0 entries|no input"),
-        (lambda: filter.correct(LEVEL, 1.0), "observation: expected a model with 2 states, found 1"),
+        (lambda: filter.update([1.0, 2.0], observation=POSITION), "measurement: expected 1 entry"),
+        (lambda: filter.update(np.inf, observation=POSITION), "measurement is infinite"),
+        (lambda: filter.update(1.0, 1.0, observation=POSITION), "input: expected 0 entries|no input"),
+        (lambda: filter.update(1.0, observation=LEVEL), "observation: expected a model with 2 states, found 1"),
         (lambda: filter.predict(WALK), "transition: expected a model with 2 states, found 1"),
     ]
     for call, message in calls:
@@ -343,7 +345,7 @@ def test_a_failed_step_changes_nothing_and_a_run_names_the_row() -> None:
     with pytest.raises(EstimationError, match="known exactly"):
         KalmanFilter([0.0], [[0.0]]).run(WALK, LinearObservation([[1.0]], [[0.0]]), [1.0])
     with pytest.raises(TypeError):
-        filter.predict(POSITION)  # type: ignore[arg-type]
+        filter.predict(POSITION)  # type: ignore[call-overload]
     assert pickle.dumps(filter) == before
 
 
@@ -373,7 +375,7 @@ def test_what_is_no_function_is_refused() -> None:
     with pytest.raises(TypeError, match="function: expected a function of x and u, found int"):
         NonlinearTransition(1, np.eye(2))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="transition: expected a LinearTransition"):
-        ExtendedKalmanFilter([0.0], [[1.0]]).predict(swing)  # type: ignore[arg-type]
+        ExtendedKalmanFilter([0.0], [[1.0]]).predict(swing)  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize("restore", [lambda o: pickle.loads(pickle.dumps(o)), copy.copy, copy.deepcopy])
@@ -392,7 +394,7 @@ def test_a_copy_goes_on_to_the_same_bits(restore: Callable[[Any], Any]) -> None:
         assert filter.gate == other.gate == math.inf
     pendulum = restore(NonlinearTransition(swing, np.eye(2), swing_jacobian))
     assert repr(pendulum) == "NonlinearTransition(swing, jacobian=given)"
-    innovation = KalmanFilter(np.zeros(3), np.eye(3)).correct(observation, [1.0, np.nan])
+    innovation = KalmanFilter(np.zeros(3), np.eye(3)).update([1.0, np.nan], observation=observation)
     np.testing.assert_array_equal(restore(innovation).variance, innovation.variance)
     for thing in (filter, transition, observation, pendulum, innovation, first):
         assert "\n" not in repr(thing)
@@ -490,7 +492,7 @@ def test_a_noise_function_that_fails_fails_the_call(where: str) -> None:
     kalman = ExtendedKalmanFilter([1.0, 2.0], np.eye(2))
     calls: dict[str, Callable[[], Any]] = {
         "predict": lambda: kalman.predict(transition),
-        "correct": lambda: kalman.correct(observation, 1.0),
+        "correct": lambda: kalman.update(1.0, observation=observation),
         "run": lambda: kalman.run(transition, observation, [1.0]),
         "smooth": lambda: kalman.smooth(transition, observation, [1.0, 2.0]),
     }
@@ -499,13 +501,65 @@ def test_a_noise_function_that_fails_fails_the_call(where: str) -> None:
     assert kalman.state.tolist() == [1.0, 2.0] and kalman.covariance.tolist() == np.eye(2).tolist()
     negative = NonlinearObservation(look, lambda x, u: [[-1.0]])
     with pytest.raises(ValueError, match="observation noise"):
-        kalman.correct(negative, 1.0)
+        kalman.update(1.0, observation=negative)
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
     level = LinearObservation([[1.0]], [[1.0]])
     given, plain = KalmanFilter([0.0], [[1.0]]), KalmanFilter([0.0], [[1.0]])
-    given.correct(level, np.float32(1.5))
-    plain.correct(level, 1.5)
+    given.update(np.float32(1.5), observation=level)
+    plain.update(1.5, observation=level)
     assert given.state == plain.state
-    given.correct(level, np.int64(2))
+    given.update(np.int64(2), observation=level)
+
+
+def test_a_filter_holds_its_models_and_steps_read_update_and_predict() -> None:
+    """As users of filterpy type: numbers for P, Q and R, and `update(z)` and `predict(u)` without models."""
+    flow = np.array([1120.0, 1160.0, math.nan, 963.0, 1210.0])
+    walk, level = LinearTransition([[1.0]], 1469.1), LinearObservation([[1.0]], 15099.0)
+    held = KalmanFilter([0.0], 1e7, transition=walk, observation=level)
+    given = KalmanFilter([0.0], [[1e7]])
+    runs = pickle.loads(pickle.dumps(held))
+    for y in flow:
+        one = held.update(y)
+        with pytest.warns(DeprecationWarning, match="its name is update"):
+            other = given.correct(level, y)
+        held.predict()
+        given.predict(walk)
+        assert one.error == other.error or math.isnan(y)
+    assert pickle.dumps(held.state) == pickle.dumps(given.state)
+    trajectory = runs.run(flow)
+    assert trajectory.log_likelihood == KalmanFilter([0.0], 1e7).run(walk, level, flow).log_likelihood
+    np.testing.assert_array_equal(runs.state, held.state)
+    np.testing.assert_array_equal(LinearTransition(np.eye(2), 0.5).noise, 0.5 * np.eye(2))
+    with pytest.raises(ValueError, match="observation: the object holds none; give observation="):
+        given.update(1.0)
+    with pytest.raises(ValueError, match="transition: expected a model with 1 states, found 2"):
+        KalmanFilter([0.0], 1.0, transition=LinearTransition(np.eye(2), 1.0))
+    with pytest.raises(TypeError, match="observation: expected a LinearObservation, found LinearTransition"):
+        KalmanFilter([0.0], 1.0, observation=walk)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="covariance is not positive semidefinite"):
+        KalmanFilter([0.0, 0.0], -1.0)
+
+
+def test_other_filters_hold_their_models_too() -> None:
+    motion, sensor = LinearTransition([[1.0, 0.1], [0.0, 1.0]], 0.01, [[0.0], [0.1]]), LinearObservation([[1.0, 0.0]], 0.04)
+    y, u = np.sin(0.3 * np.arange(30)), np.cos(0.3 * np.arange(30))
+    kalman = KalmanFilter([0.0, 0.0], 1.0, transition=motion, observation=sensor)
+    extended = ExtendedKalmanFilter([0.0, 0.0], 1.0, transition=motion, observation=sensor)
+    late = th.OutOfSequenceFilter([0.0, 0.0], 1.0, transition=motion, observation=sensor, samples=3, inputs=1)
+    observer = LuenbergerObserver([0.0, 0.0], [[0.5], [0.2]], transition=motion, observation=sensor)
+    for measured, applied in zip(y, u):
+        kalman.update(measured)
+        extended.update(measured)
+        late.update(measured, applied)
+        observer.update(measured, applied)
+        kalman.predict(applied)
+        extended.predict(applied)
+        late.predict(applied)
+    np.testing.assert_allclose(extended.state, kalman.state, atol=1e-12)
+    np.testing.assert_allclose(late.state, kalman.state, atol=1e-12)
+    again = LuenbergerObserver([0.0, 0.0], [[0.5], [0.2]], transition=motion, observation=sensor)
+    again.run(y, u)
+    np.testing.assert_array_equal(again.state, observer.state)
+    assert pickle.loads(pickle.dumps(late)).update(0.5, 0.0).error == late.update(0.5, 0.0).error

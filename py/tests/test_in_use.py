@@ -63,7 +63,7 @@ def test_methods_that_several_classes_have() -> None:
     thread.start()
     said = set()
     while thread.is_alive():
-        for ask in (lambda: model.log_row(1.0, u=1.0), lambda: model.parameters, lambda: model.a):
+        for ask in (lambda: model.update(1.0, u=1.0), lambda: model.parameters, lambda: model.a):
             try:
                 ask()
             except RuntimeError as error:
@@ -74,4 +74,4 @@ def test_methods_that_several_classes_have() -> None:
 
 def test_an_object_of_another_class_is_a_type_error() -> None:
     with pytest.raises(TypeError):
-        th.KalmanFilter.predict(th.RecursiveArx(1, 1), th.LinearTransition([[1.0]], [[1.0]]))  # type: ignore[arg-type]
+        th.KalmanFilter.predict(th.RecursiveArx(1, 1), th.LinearTransition([[1.0]], [[1.0]]))  # type: ignore[call-overload]

@@ -291,7 +291,7 @@ def test_a_filter_bridges_missing_outputs_and_noise() -> None:
     noisy = filter.run(y, u=log.u, smooth=True)
     assert np.all(np.isfinite(noisy.filtered)) and noisy.smoothed is not None
     again = pickle.loads(pickle.dumps(filter))
-    assert again.step(1.0, 0.5).outputs == filter.step(1.0, 0.5).outputs
+    assert again.update(1.0, 0.5).outputs == filter.update(1.0, 0.5).outputs
     for wrong in (-1.0, [0.1, 0.2], float("nan")):
         with pytest.raises(ValueError, match="measurement_noise"):
             th.StateFilter(model, measurement_noise=wrong)

@@ -193,10 +193,10 @@ def stepped(vector: Any) -> list[Any]:
     motion, measured = th.LinearTransition(np.eye(2), np.eye(2), np.eye(2)), th.LinearObservation(np.eye(2), np.eye(2))
     kalman, extended = th.KalmanFilter([0, 0], np.eye(2)), th.ExtendedKalmanFilter([0, 0], np.eye(2))
     for one in (kalman, extended):
-        one.correct(measured, vector)
+        one.update(vector, observation=measured)
         one.predict(motion, vector)
     called = th.ExtendedKalmanFilter([0, 0], np.eye(2))
-    called.correct(th.NonlinearObservation(lambda x, u: x + u, np.eye(2)), vector, input=vector)
+    called.update(vector, vector, observation=th.NonlinearObservation(lambda x, u: x + u, np.eye(2)))
     called.predict(th.NonlinearTransition(lambda x, u: x + u, np.eye(2)), vector)
     luenberger = th.LuenbergerObserver(vector, 0.5 * np.eye(2))
     luenberger.update(motion, measured, vector, input=vector)
@@ -205,10 +205,10 @@ def stepped(vector: Any) -> list[Any]:
     many = th.RecursiveLeastSquares(2, outputs=2)
     many.update(vector, vector)
     arx = th.RecursiveArx(1, [1, 1], input_scales=vector)
-    arx.log_row(1.0, u=vector)
+    arx.update(1.0, u=vector)
     arx.applied(vector)
     armax = th.RecursiveArmax(1, [1, 1], 1, input_scales=vector)
-    armax.log_row(1.0, u=vector)
+    armax.update(1.0, u=vector)
     armax.applied(vector)
     estimators: list[Any] = [plain, many, arx, armax]
     return [
@@ -399,11 +399,11 @@ def test_one_measurement_is_a_number_of_any_kind() -> None:
     def estimate(value: Any) -> list[Any]:
         arx, plain = th.RecursiveArx(1, 1), th.RecursiveLeastSquares(1)
         filter = th.KalmanFilter([0.0], [[1.0]])
-        arx.log_row(2.0, u=1.0)
-        arx.log_row(value, u=1.0)
+        arx.update(2.0, u=1.0)
+        arx.update(value, u=1.0)
         arx.measured(value)
         plain.update([1.0], value)
-        filter.correct(th.LinearObservation([[1.0]], [[1.0]]), value)
+        filter.update(value, observation=th.LinearObservation([[1.0]], [[1.0]]))
         return [arx.parameters, plain.parameters, filter.state]
 
     three = [3, np.float32(3), np.int8(3), np.array(3.0), decimal.Decimal(3), fractions.Fraction(3), np.float64(3)]
@@ -414,6 +414,6 @@ def test_one_measurement_is_a_number_of_any_kind() -> None:
     refused: list[Any] = ["3", np.str_("3"), None, pd.Series([3.0]), [3.0], pd.NaT, 3j, np.datetime64("2026-01-01")]
     for value in refused:
         with pytest.raises((TypeError, ValueError), match="^y: expected (a number|numbers|a datetime)"):
-            th.RecursiveArx(1, 1).log_row(value, u=1.0)
+            th.RecursiveArx(1, 1).update(value, u=1.0)
     with pytest.raises(TypeError, match="y: expected a number, found None; NaN stands for a missing one"):
-        th.RecursiveArx(1, 1).log_row(None, u=1.0)  # type: ignore[arg-type]
+        th.RecursiveArx(1, 1).update(None, u=1.0)  # type: ignore[arg-type]

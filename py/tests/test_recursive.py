@@ -89,7 +89,7 @@ def test_a_tampered_pickle_is_an_error_or_goes_on(estimator: Any) -> None:
                     if name == "RecursiveLeastSquares":
                         read.update([0.1, 1.0], 0.5)
                     else:
-                        read.log_row(0.5, u=float(k % 3))
+                        read.update(0.5, u=float(k % 3))
     assert refused > 50
     with pytest.raises(ValueError, match="of version 2, and version 1 is understood"):
         restore(name, kept.replace(b'"version":1', b'"version":2'))
@@ -335,7 +335,7 @@ def test_a_plant_is_found_row_by_row_and_by_run_alike(make: Callable[[], Recursi
     u, y = plant()
     y[40] = np.nan
     loop, run = make(), make()
-    innovations = [loop.log_row(z, u=v) for v, z in zip(u.tolist(), y.tolist())]
+    innovations = [loop.update(z, u=v) for v, z in zip(u.tolist(), y.tolist())]
     trajectory = run.run(y, u=u)
     same(trajectory, innovations)
     assert innovations[0].action == innovations[41].action == "not ready"
@@ -347,7 +347,7 @@ def test_a_plant_is_found_row_by_row_and_by_run_alike(make: Callable[[], Recursi
     np.testing.assert_array_equal(restored.predict(np.ones(5)), loop.predict(np.ones((5, 1)), 5))
     assert loop.predict(np.ones(5))[0] == pytest.approx(-run.a[1] * y[-1] + run.b[0][2] * u[-2], abs=0.05)
     run.gap()
-    assert run.log_row(0.0, u=0.0).action == "not ready"
+    assert run.update(0.0, u=0.0).action == "not ready"
     run.adapting = False
     assert not run.adapting and run.forgetting == Forgetting.exponential()
 
@@ -357,7 +357,7 @@ def test_time_is_the_order_of_the_calls(make: Callable[[], RecursiveArx | Recurs
     rows, moments = make(), make()
     u, y = plant()
     for v, z in zip(u.tolist(), y.tolist()):
-        expected = rows.log_row(z, u=v)
+        expected = rows.update(z, u=v)
         assert moments.measured(z).error == expected.error or np.isnan(expected.error)
         ahead = moments.predict([v, 1.0])
         moments.applied(v)
@@ -372,7 +372,7 @@ def test_time_is_the_order_of_the_calls(make: Callable[[], RecursiveArx | Recurs
     assert state(moments) == state(rows)
     # Inputs, and others: the output in between is missing.
     moments.applied(2.0)
-    rows.log_row(np.nan, u=2.0)
+    rows.update(np.nan, u=2.0)
     assert state(moments) == state(rows)
 
 
@@ -380,25 +380,32 @@ def test_time_is_the_order_of_the_calls(make: Callable[[], RecursiveArx | Recurs
 def test_an_input_that_acts_at_once_needs_the_row(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
     estimator = make()
     before = state(estimator)
-    with pytest.raises(ValueError, match="nk = 0.*log_row"):
+    with pytest.raises(ValueError, match="nk = 0.*update"):
         estimator.measured(1.0)
     assert state(estimator) == before
-    assert estimator.log_row(1.0, u=1.0).action == "not ready"
+    assert estimator.update(1.0, u=1.0).action == "not ready"
 
 
 @pytest.mark.parametrize("make", [lambda: RecursiveArx(1, 1), lambda: RecursiveArmax(1, 1, 1)])
-def test_outputs_and_inputs_cannot_be_swapped_by_place(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+def test_the_output_comes_first_and_then_the_input(make: Callable[[], RecursiveArx | RecursiveArmax]) -> None:
+    by_place, by_name, old = make(), make(), make()
+    for y, u in ((1.0, 3.0), (2.0, 4.0), (0.5, -1.0)):
+        by_place.update(y, u)
+        by_name.update(y, u=u)
+        with pytest.warns(DeprecationWarning, match="its name is update"):
+            old.log_row(y, u=u)
+    assert state(by_place) == state(by_name) == state(old)
+    by_place.run([1.0, 2.0], [3.0, 4.0])
+    by_name.run([1.0, 2.0], u=[3.0, 4.0])
+    assert state(by_place) == state(by_name)
     estimator = make()
     before = state(estimator)
-    for call in (estimator.run, estimator.log_row):
-        with pytest.raises(TypeError, match="positional"):
-            call([1.0, 2.0], [3.0, 4.0])  # type: ignore[arg-type, call-arg]
     with pytest.raises(ValueError, match="u: expected"):
         estimator.run([1.0, 2.0])
     with pytest.raises(ValueError, match="u: expected"):
-        estimator.log_row(1.0)
+        estimator.update(1.0)
     with pytest.raises((TypeError, ValueError), match="y: expected"):
-        estimator.log_row([1.0, 2.0], u=1.0)  # type: ignore[arg-type]
+        estimator.update([1.0, 2.0], u=1.0)  # type: ignore[arg-type]
     assert state(estimator) == before
 
 
@@ -470,9 +477,9 @@ def test_two_inputs_and_none() -> None:
     two = RecursiveArx(0, [1, 1])
     two.run(y, u=u)
     np.testing.assert_allclose([b[1] for b in two.b], [1.0, 2.0], atol=1e-3)
-    assert two.log_row(0.0, u=[1.0, 2.0]).action == "updated"
+    assert two.update(0.0, u=[1.0, 2.0]).action == "updated"
     with pytest.raises(ValueError, match="u: expected 2 entries, found a number"):
-        two.log_row(0.0, u=1.0)
+        two.update(0.0, u=1.0)
     with pytest.raises(ValueError, match="u"):
         two.run(y, u=u[:, :1])
     series = RecursiveArx(1, 0)
@@ -481,7 +488,7 @@ def test_two_inputs_and_none() -> None:
     with pytest.raises(ValueError, match="steps"):
         series.predict()
     with pytest.raises(ValueError, match="u: expected None"):
-        series.log_row(1.0, u=[1.0])
+        series.update(1.0, u=[1.0])
 
 
 def test_armax_finds_the_noise() -> None:

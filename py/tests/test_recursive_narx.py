@@ -27,7 +27,7 @@ def test_a_plant_is_found_by_rows_by_run_and_by_calls() -> None:
     u, y = record()
     rows, calls, run = plant(), plant(), plant()
     for one, other in zip(u, y):
-        rows.log_row(other, u=one)
+        rows.update(other, u=one)
         calls.measured(other)
         calls.applied(one)
     trajectory = run.run(y, u=u)
@@ -44,7 +44,7 @@ def test_predictions_and_slopes_are_those_of_the_equation() -> None:
     model = plant(parameters=[0.5, 1.0, -0.2])
     assert model.output_at([25.0, 3.0]) == pytest.approx(20 + 5 * (0.5 + 1.0 - 0.2))
     np.testing.assert_allclose(model.slopes_at([25.0, 3.0]), [0.5 - 0.2, 5 * (1.0 - 0.2) / 2])
-    model.log_row(25.0, u=3.0)
+    model.update(25.0, u=3.0)
     ahead = model.predict([3.0, 1.0])
     z = 0.5 + 1.0 - 0.2
     np.testing.assert_allclose(ahead, [20 + 5 * z, 20 + 5 * (0.5 * z + 1.0 - 0.2 * z)])
@@ -100,7 +100,7 @@ def test_what_is_wrong_is_told() -> None:
     model = plant()
     before = pickle.dumps(model)
     with pytest.raises(ValueError, match="infinite"):
-        model.log_row(np.inf, u=1.0)
+        model.update(np.inf, u=1.0)
     with pytest.raises(ValueError, match="regressors"):
         model.slopes_at([1.0])
     assert pickle.dumps(model) == before

@@ -202,13 +202,13 @@ def test_matrices_are_the_model_that_the_text_is(folder: Path) -> None:
     plain = th.StateModel(np.eye(3), np.eye(2, 3), np.eye(3), np.eye(2), np.eye(3), sample_time=pd.Timedelta("2s"), G=np.ones((3, 2)), x0=[1, 2, 3])
     assert (plain.states, plain.inputs, plain.outputs) == (["x1", "x2", "x3"], ["u1", "u2"], ["y1", "y2"])
     assert repr(plain) == "StateModel(states x1, x2, x3, inputs u1, u2, outputs y1, y2, sample time 2.0 s)"
-    first = th.StateFilter(plain).step([0.0, 0.0], [0.0, 0.0])
+    first = th.StateFilter(plain).update([0.0, 0.0], [0.0, 0.0])
     assert first.predicted.tolist() == [1.0, 2.0, 3.0]
 
 
 def test_the_nile() -> None:
     filter = th.StateFilter(th.StateModel.from_toml(NILE))
-    estimate = filter.step(1120.0)
+    estimate = filter.update(1120.0)
     # Durbin and Koopman, Time Series Analysis by State Space Methods, section 2.2.
     assert estimate.filtered[0] == pytest.approx(1118.311462, abs=1e-6)
     assert estimate.filtered_deviations[0] ** 2 == pytest.approx(15076.236391, abs=1e-6)
@@ -223,7 +223,7 @@ def test_steps_in_a_loop_and_a_run_are_the_same() -> None:
     whole, loop = th.StateFilter(model), th.StateFilter(model)
     trajectory = whole.run(frame)
     for row, (u, *y) in enumerate(frame.to_numpy().tolist()):
-        estimate = loop.step(y, u)
+        estimate = loop.update(y, u)
         for name in ("predicted", "filtered", "filtered_deviations", "outputs", "innovations", "nis", "nis_bounds", "held"):
             np.testing.assert_array_equal(getattr(estimate, name), getattr(trajectory, name)[row], err_msg=name)
         assert (estimate.action, estimate.row) == (trajectory.actions[row], row)
@@ -283,7 +283,7 @@ def test_frames_go_in_and_come_back_with_their_index(folder: Path) -> None:
     np.testing.assert_array_equal(apart.filtered, spaced.filtered)
     stepped = th.StateFilter(model)
     for y in flow:
-        stepped.step(y, seconds=pd.Timedelta("2s"))
+        stepped.update(y, seconds=pd.Timedelta("2s"))
     latest = stepped.latest
     assert latest is not None and latest.filtered[0] == apart.filtered[-1, 0]
 
@@ -324,12 +324,12 @@ def test_bad_rows_change_nothing(data: Any, options: dict[str, Any], error: type
 
 def test_bad_steps_change_nothing() -> None:
     filter = th.StateFilter(th.StateModel.from_toml(TWO))
-    filter.step([1.0, 2.0], 0.5)
+    filter.update([1.0, 2.0], 0.5)
     before = filter.to_json()
     cases: list[tuple[tuple[Any, ...], dict[str, Any], type[Exception], str]] = [
         (([1.0], 0.5), {}, ValueError, r"y: expected 2 entries, found shape \(1,\)"),
         ((1.0, 0.5), {}, ValueError, "y: expected 2 entries, found a number"),
-        (([1.0, 2.0],), {}, ValueError, "u: expected 1 numbers, found None"),
+        (([1.0, 2.0],), {}, ValueError, "u: expected a number, found None"),
         (([1.0, 2.0], [1.0, 2.0]), {}, ValueError, "u: expected 1 entry"),
         (([1.0, np.inf], 0.5), {}, ValueError, "'there' is infinite in row 2"),
         (([1.0, 2.0], -np.inf), {}, ValueError, "'force' is infinite in row 2"),
@@ -340,7 +340,7 @@ def test_bad_steps_change_nothing() -> None:
     ]
     for arguments, options, error, message in cases:
         with pytest.raises(error, match=message):
-            filter.step(*arguments, **options)
+            filter.update(*arguments, **options)
         assert filter.to_json() == before and filter.rows == 1
     alone = th.StateFilter(th.StateModel.from_toml(TWO)).run([[1.0, 2.0]], u=[np.nan])
     assert len(alone) == 1 and alone.held.tolist() == [[True]]
@@ -419,3 +419,19 @@ def test_a_text_that_is_wrong_says_where() -> None:
         th.StateModel.from_toml(3)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="path"):
         th.StateModel.read(3)  # type: ignore[arg-type]
+
+
+def test_a_filter_predicts_from_inputs_to_come() -> None:
+    log = th.dc_motor()
+    model = th.arx(log[:700], na=2, nb=2)
+    filter = th.StateFilter(model)
+    filter.run(log[:900])
+    ahead = filter.predict(log.u[900:905])
+    np.testing.assert_allclose(ahead, model.forecast(log[:900], 5, log.u[900:905]).values, rtol=1e-6)
+    assert filter.rows == 900
+    assert filter.predict().shape == (1,)
+    np.testing.assert_allclose(filter.predict(steps=3), filter.predict(np.full(3, log.u[899, 0])))
+    with pytest.raises(ValueError, match="u: expected shape"):
+        filter.predict([[1.0, 2.0]])
+    with pytest.warns(DeprecationWarning, match="its name is update"):
+        filter.step(1.0, 1.0)

@@ -110,7 +110,7 @@ def test_all_is_the_same_as_on_the_command_line(folder: Path, words: str, clock:
     assert again.state() == state and again.to_json() == document
     loop = th.Tracker(**options)
     for row in range(60):
-        one = loop.log_row(log.y[row], log.u[row] if loop.inputs else None, time=log.time[row] if clock else None)
+        one = loop.update(log.y[row], log.u[row] if loop.inputs else None, time=log.time[row] if clock else None)
         for name in ("predicted", "variances", "nis", "excitation"):
             field = {"variances": "variance"}.get(name, name)
             np.testing.assert_array_equal(getattr(one, field), getattr(trajectory, name)[row], err_msg=name)
@@ -307,25 +307,25 @@ def test_bad_single_rows_change_nothing() -> None:
         fresh.run([1.0, np.inf], u=[1.0, 1.0], time=[0.0, 1.0])
     assert fresh.state() == before
     cases: list[tuple[tuple[Any, ...], dict[str, Any], type[Exception], str]] = [
-        ((np.inf, 1.0), {}, ValueError, "row 1: 'y' is infinite"),
-        ((1.0, np.inf), {}, ValueError, "row 1: 'u' is infinite"),
-        ((1.0,), {}, ValueError, "u: expected 1 numbers, found 0"),
-        ((1.0, [1.0, 2.0]), {}, ValueError, "u: expected 1 numbers, found 2"),
-        (([1.0, 2.0], 1.0), {}, ValueError, r"y: expected a number, found shape \(2,\)"),
+        ((np.inf, 1.0), {}, ValueError, "^'y' is infinite"),
+        ((1.0, np.inf), {}, ValueError, "^'u' is infinite"),
+        ((1.0,), {}, ValueError, "u: expected a number, found None"),
+        ((1.0, [1.0, 2.0]), {}, ValueError, r"u: expected 1 entry, found shape \(2,\)"),
+        (([1.0, 2.0], 1.0), {}, ValueError, r"y: expected 1 entry, found shape \(2,\)"),
         (("a", 1.0), {}, TypeError, "y: expected numbers"),
         ((1.0, 1.0), {"time": np.nan}, ValueError, "time: nan is not a finite number"),
         ((1.0, 1.0), {"time": "noon"}, TypeError, "time: expected a number"),
     ]
     for arguments, options, error, message in cases:
         with pytest.raises(error, match=message):
-            fresh.log_row(*arguments, **options)
+            fresh.update(*arguments, **options)
         assert fresh.state() == before
     timed = th.Tracker(1, 1)
-    timed.log_row(1.0, 1.0, time=3.0)
-    with pytest.raises(ValueError, match="^time: the first row is 1 s before the latest one"):
-        timed.log_row(1.0, 1.0, time=2.0)
+    timed.update(1.0, 1.0, time=3.0)
+    with pytest.raises(ValueError, match="^time: the row is 1 s before the latest one"):
+        timed.update(1.0, 1.0, time=2.0)
     assert timed.rows == 1
-    large = timed.log_row(1e120, 1.0, time=4.0)
+    large = timed.update(1e120, 1.0, time=4.0)
     assert large.action == "too large"
 
 
@@ -434,7 +434,7 @@ def test_several_outputs_are_those_of_the_program(folder: Path, couple: str) -> 
     assert tracker.to_json() == document and tracker.state() == state
     again = pickle.loads(pickle.dumps(tracker))
     row = ([1.0, 2.0], 0.5)
-    assert str(again.log_row(*row)) == str(tracker.log_row(*row))
+    assert str(again.update(*row)) == str(tracker.update(*row))
     assert set(tracker.offsets) == {"u", "hot", "cold"}
     if couple == "full":
         assert tracker.parameter_names == ["a1_1", "a1_2", "a2_1", "a2_2", "b1"]
@@ -445,15 +445,15 @@ def test_several_outputs_one_row_at_a_time() -> None:
     tracker = th.Tracker(1, 1, output=["a", "b"], forgetting=None)
     whole = th.Tracker(1, 1, output=["a", "b"], forgetting=None).run(y, u=u)
     for at in range(100):
-        seen = tracker.log_row(y[at], u[at])
+        seen = tracker.update(y[at], u[at])
         assert np.shape(seen.predicted) == (2,)
         np.testing.assert_array_equal(seen.error, whole.errors[at])
     np.testing.assert_array_equal(tracker.parameters, whole.parameters[99])
     with pytest.raises(AttributeError, match="several outputs: a, b"):
         tracker.output  # noqa: B018
     for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [1.0, np.inf]):
-        with pytest.raises(ValueError, match=r"y: expected 2 numbers|infinite"):
-            tracker.log_row(wrong, 0.0)
+        with pytest.raises(ValueError, match=r"y: expected 2 entries|infinite"):
+            tracker.update(wrong, 0.0)
     with pytest.raises(ValueError, match="couple: it is for several outputs"):
         th.Tracker(1, 1, couple="none")
     with pytest.raises(ValueError, match="several outputs are tracked as ARX"):
@@ -492,3 +492,38 @@ def test_the_parameters_of_one_of_several_outputs_are_drawn() -> None:
         plot.parameters(trajectory)
     with pytest.raises(ValueError, match="'c' is none of a, b"):
         plot.parameters(trajectory, output="c")
+
+
+def test_predictions_from_inputs_to_come() -> None:
+    log = th.dc_motor()
+    tracker = th.Tracker(2, 2, forgetting=None)
+    tracker.run(log[:900])
+    ahead = tracker.predict(log.u[900:910])
+    assert ahead.shape == (10,)
+    assert np.sqrt(np.mean((ahead - log.y[900:910]) ** 2)) < 0.2 * np.std(log.y)
+    held = tracker.predict(np.full(4, log.u[899, 0]))
+    np.testing.assert_allclose(tracker.predict(steps=4), held, rtol=1e-12)
+    assert tracker.predict(steps=4)[-1] == tracker.forecast(4)
+    assert tracker.predict()[0] == tracker.forecast(1)
+    both = th.Tracker(2, 2, forgetting=[0.99, None])
+    both.run(log[:900])
+    assert both.predict(log.u[900:903]).shape == (3, 2)
+    y, u = two_outputs()
+    coupled = th.Tracker(1, 1, output=["a", "b"], forgetting=None)
+    coupled.run(y[:90], u=u[:90])
+    found = coupled.predict(u[90:95])
+    assert found.shape == (5, 2)
+    np.testing.assert_array_equal(coupled.predict(steps=3)[-1], coupled.forecast(3))
+    for wrong in ({"u": [[1.0, 2.0]]}, {"u": [1.0], "steps": 2}, {"steps": 0}, {"u": [np.inf]}):
+        with pytest.raises(ValueError, match="u: |steps: "):
+            tracker.predict(**wrong)
+    with pytest.warns(DeprecationWarning, match="its name is update"):
+        tracker.log_row(1.0, 1.0, time=log.time[900])
+
+
+def test_the_row_of_an_alarm_counts_rows_since_the_first() -> None:
+    log = th.dc_motor()
+    tracker = th.Tracker(1, 1, alarm=100)
+    for y, u in zip(log.y[:500], log.u[:500]):
+        tracker.update(y, u)
+    assert [alarm.row for alarm in tracker.update(1e4, 0.0).alarms] == [500]

@@ -51,7 +51,7 @@ def test_rows_one_by_one_are_the_run_to_the_bit() -> None:
     whole, single, control = exact(), exact(), exact()
     trajectory = whole.run(y, u=u)
     for k in range(len(y)):
-        seen = single.log_row(y[k], u=u[k])
+        seen = single.update(y[k], u=u[k])
         np.testing.assert_array_equal(seen.error, trajectory.errors[k])
         if k == 50:
             assert seen.action == "missing"
@@ -93,17 +93,17 @@ def test_what_is_wrong_is_refused_and_changes_nothing() -> None:
     before = pickle.dumps(model)
     for wrong in (1.0, [1.0], [1.0, 2.0, 3.0], [1.0, np.inf], [1e300, 0.0], "ab", None):
         with pytest.raises((TypeError, ValueError), match="y"):
-            model.log_row(wrong, u=u[0])  # type: ignore[arg-type]
+            model.update(wrong, u=u[0])  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="u: "):
-        model.log_row(y[0], u=[1.0])
+        model.update(y[0], u=[1.0])
     bad = y.copy()
     bad[7, 0] = np.inf
     with pytest.raises(ValueError, match="row 8"):
         model.run(bad, u=u)
-    with pytest.raises(ValueError, match="future_inputs"):
+    with pytest.raises(ValueError, match="u: expected an array with 2 columns"):
         model.predict()
     assert pickle.dumps(model) == before
-    with pytest.raises(ValueError, match="nk = 0|its own sample|log_row"):
+    with pytest.raises(ValueError, match="nk = 0|its own sample|update"):
         th.RecursiveVectorArx(2, 1, 1, 0).measured([0.0, 0.0])
     for arguments in ((0, 1, 1), (2, 0, 0), (5000, 1, 1), (2, -1, 1)):
         with pytest.raises(ValueError):
@@ -111,6 +111,6 @@ def test_what_is_wrong_is_refused_and_changes_nothing() -> None:
     with pytest.raises(ValueError, match="parameters"):
         th.RecursiveVectorArx(2, 1, 1, parameters=np.zeros((3, 3)))
     model.adapting = False
-    assert model.log_row(y[60], u=u[60]).action == "frozen" and not model.adapting
+    assert model.update(y[60], u=u[60]).action == "frozen" and not model.adapting
     model.gap()
     assert np.isnan(model.predict(u[:2])).all()

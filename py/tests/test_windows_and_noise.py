@@ -173,13 +173,13 @@ def test_a_late_measurement_is_to_the_bit_as_one_in_time(late_by: int) -> None:
     in_time = th.ExtendedKalmanFilter([0.0, 0.0], np.eye(2), gate=9.0)
     y, u = random.normal(size=(60, 2)), random.normal(size=60)
     for k in range(60):
-        late.correct(sensors, [y[k, 0], math.nan], input=u[k])
+        late.update([y[k, 0], math.nan], u[k], observation=sensors)
         if k >= late_by:
             assert late.correct_late(motion, sensors, late_by, [math.nan, y[k - late_by, 1]]).action in ("updated", "gated")
         late.predict(motion, u[k])
     late = pickle.loads(pickle.dumps(late))
     for k in range(60):
-        in_time.correct(sensors, [y[k, 0], y[k, 1] if k < 60 - late_by else math.nan])
+        in_time.update([y[k, 0], y[k, 1] if k < 60 - late_by else math.nan], observation=sensors)
         in_time.predict(motion, u[k])
     np.testing.assert_array_equal(late.state, in_time.state)
     np.testing.assert_array_equal(late.covariance, in_time.covariance)
@@ -190,7 +190,7 @@ def test_too_late_twice_and_from_the_future_are_refused() -> None:
     motion, sensors = models()
     late = th.OutOfSequenceFilter([0.0, 0.0], np.eye(2), samples=3, outputs=2, inputs=1)
     for k in range(2):
-        late.correct(sensors, [1.0, math.nan], input=0.0)
+        late.update([1.0, math.nan], 0.0, observation=sensors)
         late.predict(motion, 0.0)
     before = pickle.dumps(late)
     for age, measurement, message in (

@@ -1,7 +1,7 @@
 //! Tracking in memory: rows come from a caller, and nothing is read or written.
 
 use thetahat::report::Report;
-use thetahat::track::{TrackOptions, TrackSummary, Tracked, Tracker, forecasts};
+use thetahat::track::{TrackOptions, TrackSummary, Tracked, Tracker, forecasts, predictions};
 
 use super::channels::Channels;
 use super::columns::Columns;
@@ -172,6 +172,30 @@ impl Tracking {
         done
     }
 
+    /// Takes one row, as [`rows`](Self::rows) takes many, without a copy of where it stood: its values are checked before
+    /// anything changes.
+    ///
+    /// # Errors
+    /// A [`Failure`] if a value is infinite.
+    pub fn row(
+        &mut self,
+        clock: &str,
+        values: &[f64],
+        time: Option<f64>,
+        mut seen: impl FnMut(&TrackedRow<'_>),
+    ) -> Result<(), Failure> {
+        let mut named = self.inputs.iter().chain(&self.outputs).zip(values);
+        if let Some((name, _)) = named.find(|(_, value)| value.is_infinite()) {
+            return Err(Failure::data(format!("'{name}' is infinite; NaN is a missing sample")));
+        }
+        if self.state.rows == 0 {
+            self.state.name_clock(clock, None);
+            self.set_columns(None);
+        }
+        let mut next = Some((values, time, false));
+        self.take(&mut || Ok::<_, Failure>(next.take()), &mut seen, false)
+    }
+
     /// The columns of the lines, which depend on whether there is a clock; they go on after what was written.
     fn set_columns(&mut self, written: Option<Written>) {
         self.columns =
@@ -259,6 +283,22 @@ impl Tracking {
         each.collect::<Result<Vec<_>, _>>()
             .map(|models| models.concat())
             .map_err(|error| Failure::option(&error))
+    }
+
+    /// The predictions of the next rows of each, a row for each step, see [`predictions`].
+    ///
+    /// # Errors
+    /// A [`Failure`] if the steps are out of their range, or the inputs not as many.
+    pub fn predict(&mut self, future: Option<&[f64]>, steps: usize) -> Result<Vec<Vec<f64>>, Failure> {
+        let count = self.outputs.len().max(1);
+        let mut rows = vec![Vec::with_capacity(self.state.trackers.len()); steps];
+        for trackers in self.state.trackers.chunks_mut(count) {
+            let found = predictions(trackers, future, steps).map_err(|error| Failure::option(&error))?;
+            for (row, found) in rows.iter_mut().zip(found.chunks_exact(count)) {
+                row.extend_from_slice(found);
+            }
+        }
+        Ok(rows)
     }
 
     /// The input channels.

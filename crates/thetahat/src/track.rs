@@ -44,7 +44,7 @@ mod tracker;
 mod warm;
 mod words;
 
-pub use forecasts::forecasts;
+pub use forecasts::{forecasts, predictions};
 pub use options::{TrackMap, TrackModel, TrackOptions};
 pub use plan::{PerChannel, Policy, TrackMethod, TrackOutliers, TrackPlan, TrackStart};
 pub use run_length::change_detector;

@@ -1,9 +1,10 @@
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Protocol, final, type_check_only
+from typing import Any, Literal, Protocol, final, overload, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import deprecated
 
 __all__ = [
     "CRITERIA",
@@ -255,6 +256,7 @@ class StateFilter:
         gain: ArrayLike | None,
     ) -> StateFilter: ...
     def step(self, seconds: float | None, inputs: ArrayLike | None, outputs: ArrayLike) -> dict[str, Any]: ...
+    def predict(self, inputs: ArrayLike, steps: int) -> _Array: ...
     def latest(self) -> dict[str, Any] | None: ...
     def run(
         self, seconds: ArrayLike | None, inputs: ArrayLike, outputs: ArrayLike, start: float, smooth: bool
@@ -283,6 +285,8 @@ class Tracker:
         gaps: Sequence[int],
         stop_on_alarm: bool,
     ) -> dict[str, Any]: ...
+    def row(self, y: ArrayLike, u: ArrayLike | None, time: float | None) -> tuple[Any, ...]: ...
+    def predict(self, future: ArrayLike | None, steps: int) -> _Array: ...
     def gap(self) -> None: ...
     def forecast(self, steps: int) -> _Array: ...
     def to_json(self) -> str: ...
@@ -461,9 +465,11 @@ class RecursiveLeastSquares(_RecursiveEstimator):
 class _RecursiveModel(_RecursiveEstimator):
     def measured(self, y: float) -> Innovation: ...
     def applied(self, u: ArrayLike) -> None: ...
+    def update(self, y: float, u: ArrayLike | None = None) -> Innovation: ...
+    @deprecated("log_row is deprecated: its name is update")
     def log_row(self, y: float, *, u: ArrayLike | None = None) -> Innovation: ...
-    def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
-    def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
+    def run(self, y: ArrayLike, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
+    def predict(self, u: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
     def gap(self) -> None: ...
     @property
     def noise_variance(self) -> float | None: ...
@@ -525,9 +531,11 @@ class RecursiveVectorArx(_RecursiveEstimator):
     ) -> RecursiveVectorArx: ...
     def measured(self, y: ArrayLike) -> Innovation: ...
     def applied(self, u: ArrayLike) -> None: ...
+    def update(self, y: ArrayLike, u: ArrayLike | None = None) -> Innovation: ...
+    @deprecated("log_row is deprecated: its name is update")
     def log_row(self, y: ArrayLike, *, u: ArrayLike | None = None) -> Innovation: ...
-    def run(self, y: ArrayLike, *, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
-    def predict(self, future_inputs: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
+    def run(self, y: ArrayLike, u: ArrayLike | None = None) -> RecursiveTrajectory: ...
+    def predict(self, u: ArrayLike | None = None, steps: int | None = None) -> _Array: ...
     def gap(self) -> None: ...
     @property
     def a(self) -> _Array: ...
@@ -797,9 +805,12 @@ class NonlinearObservation:
 @final
 class KalmanFilter:
     def __new__(
-        cls, state: ArrayLike, covariance: ArrayLike, *, gate: float = ..., release: int = 0
+        cls, state: ArrayLike, covariance: ArrayLike, *, transition: LinearTransition | None = None, observation: LinearObservation | None = None, gate: float = ..., release: int = 0
     ) -> KalmanFilter: ...
-    def predict(self, transition: LinearTransition, input: ArrayLike | None = None) -> None: ...
+    @overload
+    def predict(self, u: ArrayLike | None = None, *, transition: LinearTransition | None = None) -> None: ...
+    @overload
+    def predict(self, u: LinearTransition, input: ArrayLike | None = None) -> None: ...
     def predict_correlated(
         self,
         transition: LinearTransition,
@@ -809,28 +820,57 @@ class KalmanFilter:
         *,
         input: ArrayLike | None = None,
     ) -> None: ...
+    def update(
+        self, y: ArrayLike, u: ArrayLike | None = None, *, observation: LinearObservation | None = None
+    ) -> Innovation: ...
+    @deprecated("correct is deprecated: its name is update")
     def correct(
         self, observation: LinearObservation, measurement: ArrayLike, *, input: ArrayLike | None = None
     ) -> Innovation: ...
+    @overload
     def run(
         self,
-        transition: LinearTransition,
-        observation: LinearObservation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: LinearTransition | None = None,
+        observation: LinearObservation | None = None,
+        cross_covariance: ArrayLike | None = None,
+    ) -> FilterTrajectory: ...
+    @overload
+    def run(
+        self,
+        y: LinearTransition,
+        u: LinearObservation,
         measurements: ArrayLike,
         *,
         inputs: ArrayLike | None = None,
         cross_covariance: ArrayLike | None = None,
     ) -> FilterTrajectory: ...
+    @overload
     def smooth(
         self,
-        transition: LinearTransition,
-        observation: LinearObservation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: LinearTransition | None = None,
+        observation: LinearObservation | None = None,
+    ) -> SmoothedTrajectory: ...
+    @overload
+    def smooth(
+        self,
+        y: LinearTransition,
+        u: LinearObservation,
         measurements: ArrayLike,
         *,
         inputs: ArrayLike | None = None,
     ) -> SmoothedTrajectory: ...
     def steady_state(
-        self, transition: LinearTransition, observation: LinearObservation, maximum_steps: int = 100000
+        self, transition: LinearTransition | None = None, observation: LinearObservation | None = None, maximum_steps: int = 100000
     ) -> SteadyState: ...
     @property
     def state(self) -> _Array: ...
@@ -846,24 +886,55 @@ class KalmanFilter:
 @final
 class ExtendedKalmanFilter:
     def __new__(
-        cls, state: ArrayLike, covariance: ArrayLike, *, gate: float = ..., release: int = 0, iterations: int = 1
+        cls, state: ArrayLike, covariance: ArrayLike, *, transition: _Transition | None = None, observation: _Observation | None = None, gate: float = ..., release: int = 0, iterations: int = 1
     ) -> ExtendedKalmanFilter: ...
-    def predict(self, transition: _Transition, input: ArrayLike | None = None) -> None: ...
+    @overload
+    def predict(self, u: ArrayLike | None = None, *, transition: _Transition | None = None) -> None: ...
+    @overload
+    def predict(self, u: _Transition, input: ArrayLike | None = None) -> None: ...
+    def update(
+        self, y: ArrayLike, u: ArrayLike | None = None, *, observation: _Observation | None = None
+    ) -> Innovation: ...
+    @deprecated("correct is deprecated: its name is update")
     def correct(
         self, observation: _Observation, measurement: ArrayLike, *, input: ArrayLike | None = None
     ) -> Innovation: ...
+    @overload
     def run(
         self,
-        transition: _Transition,
-        observation: _Observation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> FilterTrajectory: ...
+    @overload
+    def run(
+        self,
+        y: _Transition,
+        u: _Observation,
         measurements: ArrayLike,
         *,
         inputs: ArrayLike | None = None,
     ) -> FilterTrajectory: ...
+    @overload
     def smooth(
         self,
-        transition: _Transition,
-        observation: _Observation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> SmoothedTrajectory: ...
+    @overload
+    def smooth(
+        self,
+        y: _Transition,
+        u: _Observation,
         measurements: ArrayLike,
         *,
         inputs: ArrayLike | None = None,
@@ -888,6 +959,8 @@ class OutOfSequenceFilter:
         state: ArrayLike,
         covariance: ArrayLike,
         *,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
         samples: int,
         outputs: int = 1,
         inputs: int = 0,
@@ -895,7 +968,14 @@ class OutOfSequenceFilter:
         release: int = 0,
         iterations: int = 1,
     ) -> OutOfSequenceFilter: ...
-    def predict(self, transition: _Transition, input: ArrayLike | None = None) -> None: ...
+    @overload
+    def predict(self, u: ArrayLike | None = None, *, transition: _Transition | None = None) -> None: ...
+    @overload
+    def predict(self, u: _Transition, input: ArrayLike | None = None) -> None: ...
+    def update(
+        self, y: ArrayLike, u: ArrayLike | None = None, *, observation: _Observation | None = None
+    ) -> Innovation: ...
+    @deprecated("correct is deprecated: its name is update")
     def correct(
         self, observation: _Observation, measurement: ArrayLike, *, input: ArrayLike | None = None
     ) -> Innovation: ...
@@ -915,7 +995,7 @@ class OutOfSequenceFilter:
 
 @final
 class LuenbergerObserver:
-    def __new__(cls, state: ArrayLike, gain: ArrayLike) -> LuenbergerObserver: ...
+    def __new__(cls, state: ArrayLike, gain: ArrayLike, *, transition: _Transition | None = None, observation: _Observation | None = None) -> LuenbergerObserver: ...
     def place(
         self,
         transition: _Transition,
@@ -925,18 +1005,42 @@ class LuenbergerObserver:
         weights: ArrayLike | None = None,
         input: ArrayLike | None = None,
     ) -> None: ...
+    @overload
     def update(
         self,
-        transition: _Transition,
-        observation: _Observation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurement: None = None,
+        *,
+        input: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> Innovation: ...
+    @overload
+    def update(
+        self,
+        y: _Transition,
+        u: _Observation,
         measurement: ArrayLike,
         *,
         input: ArrayLike | None = None,
     ) -> Innovation: ...
+    @overload
     def run(
         self,
-        transition: _Transition,
-        observation: _Observation,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> ObserverTrajectory: ...
+    @overload
+    def run(
+        self,
+        y: _Transition,
+        u: _Observation,
         measurements: ArrayLike,
         *,
         inputs: ArrayLike | None = None,

@@ -117,11 +117,15 @@ pub(crate) fn sample(
         return Err(PyValueError::new_err(format!("{argument}: expected None, as there is no input")));
     }
     if value.is_none() {
-        return Err(PyValueError::new_err(format!("{argument}: expected {length} numbers, found None")));
+        return Err(PyValueError::new_err(format!("{argument}: expected {}, found None", numbers(length))));
     }
     let array = array::vector(argument, value, Some(length))?;
     into.copy_from_slice(array.as_slice()?);
     Ok(())
+}
+
+fn numbers(count: usize) -> String {
+    if count == 1 { "a number".to_owned() } else { format!("{count} numbers") }
 }
 
 /// Whether it is a number: of Python, of NumPy, or of another package, such as a decimal.
@@ -185,13 +189,22 @@ pub(crate) fn row(entries: &[f64], row: usize, columns: usize) -> &[f64] {
     entries.get(row * columns..(row + 1) * columns).unwrap_or_default()
 }
 
-/// A covariance matrix, n x n.
+/// A covariance matrix, n x n; a number is that variance of each of the n, independent of one another.
 pub(crate) fn covariance(
     argument: &str,
     value: &Bound<'_, PyAny>,
     size: Option<usize>,
 ) -> PyResult<Covariance<f64, Dyn>> {
-    let matrix = array::finite_matrix(argument, value, [size, size])?;
+    let matrix = match size {
+        Some(size) if is_number(value) => {
+            let variance = number(argument, value)?;
+            if !variance.is_finite() {
+                return Err(PyValueError::new_err(format!("{argument}: {variance} is not finite")));
+            }
+            DMatrix::from_diagonal_element(size, size, variance)
+        }
+        _ => array::finite_matrix(argument, value, [size, size])?,
+    };
     covariance_of(argument, &matrix).map_err(PyValueError::new_err)
 }
 
@@ -217,7 +230,7 @@ pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, length: usize) -> PyResult
         Some(value) => sample("input", value, length, input.as_mut_slice())?,
         None if length == 0 => (),
         None => {
-            return Err(PyValueError::new_err(format!("input: expected {length} numbers, found None")));
+            return Err(PyValueError::new_err(format!("input: expected {}, found None", numbers(length))));
         }
     }
     Ok(input)
@@ -264,7 +277,7 @@ fn renamed(error: Error) -> Error {
 fn name(argument: &'static str) -> &'static str {
     match argument {
         "regressor" => "phi",
-        "inputs" => "u",
+        "inputs" | "future_inputs" => "u",
         "output" | "outputs" => "y",
         "width" => "dead_zone",
         _ => argument,

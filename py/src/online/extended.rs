@@ -8,6 +8,7 @@ use thetahat_core::{
 };
 
 use super::argument::{self, Whole, failed};
+use super::held::{Arguments, Held, predicted, renamed};
 use super::innovation::{Innovation, list};
 use super::kalman::started;
 use super::trajectory::{
@@ -15,7 +16,7 @@ use super::trajectory::{
     smooth, smoothed,
 };
 use super::used::{Used, UsedObservation, UsedTransition};
-use super::{Reduced, Stop, snapshot};
+use super::{Reduced, Stop};
 use crate::array;
 
 /// The extended Kalman filter: the Kalman filter of the linearised model.
@@ -26,8 +27,8 @@ use crate::array;
 /// ----------
 /// state : array_like, shape (n,)
 ///     The estimate of the state to start from. For `run` it is that before the first measurement.
-/// covariance : array_like, shape (n, n)
-///     The covariance of its error.
+/// covariance : float, or array_like of shape (n, n)
+///     The covariance of its error; a number is the variance of each state.
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
 /// release : int, default 0
@@ -35,6 +36,10 @@ use crate::array;
 ///     is a gate that never lets go: it may lock the filter out for ever.
 /// iterations : int, default 1
 ///     How often a correction linearises the observation, each time about its last result.
+/// transition : LinearTransition or NonlinearTransition, optional
+///     The model of the state, of steps that are not given one.
+/// observation : LinearObservation or NonlinearObservation, optional
+///     The model of the measurement, of steps that are not given one.
 ///
 /// Notes
 /// -----
@@ -61,16 +66,17 @@ use crate::array;
 /// >>> pendulum = NonlinearTransition(swing, np.zeros((2, 2)))
 /// >>> sideways = NonlinearObservation(lambda x, u: np.sin(x[:1]), [[1e-4]])
 /// >>> truth = np.array([0.8, 0.0])
-/// >>> estimate = ExtendedKalmanFilter([0.5, 0.3], 0.1 * np.eye(2))
+/// >>> estimate = ExtendedKalmanFilter([0.5, 0.3], 0.1, transition=pendulum, observation=sideways)
 /// >>> for _ in range(200):
 /// ...     truth = swing(truth, None)
-/// ...     estimate.predict(pendulum)
-/// ...     innovation = estimate.correct(sideways, float(np.sin(truth[0])))
+/// ...     estimate.predict()
+/// ...     innovation = estimate.update(float(np.sin(truth[0])))
 /// >>> bool(np.all(np.abs(estimate.state - truth) < 2e-3))
 /// True
 #[pyclass(module = "thetahat")]
 pub(crate) struct ExtendedKalmanFilter {
     pub(crate) filter: Stepper<f64, Dyn>,
+    pub(super) held: Held,
 }
 
 /// A filter with its models. `before` is called before a model is used; `troubled` says whether a function went wrong.
@@ -144,12 +150,17 @@ pub(crate) fn input(value: Option<&Bound<'_, PyAny>>, wanted: Option<usize>) -> 
 #[pyo3(crate = "crate::in_use")]
 impl ExtendedKalmanFilter {
     #[new]
-    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0), iterations = Whole(1)))]
-    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, release=0, iterations=1)")]
+    #[pyo3(signature = (state, covariance, *, transition = None, observation = None, gate = f64::INFINITY, release = Whole(0), iterations = Whole(1)))]
+    #[pyo3(
+        text_signature = "(state, covariance, *, transition=None, observation=None, gate=1e999, release=0, iterations=1)"
+    )]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
         py: Python<'_>,
         state: &Bound<'_, PyAny>,
         covariance: &Bound<'_, PyAny>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
         gate: f64,
         release: Whole,
         iterations: Whole,
@@ -157,17 +168,20 @@ impl ExtendedKalmanFilter {
         let iterations = argument::count("iterations", iterations, 1, 1000)?;
         let filter = Stepper::from(started(py, state, covariance, gate, release)?);
         let filter = filter.with_iterations(iterations).map_err(|error| failed(py, error))?;
-        Ok(ExtendedKalmanFilter { filter })
+        let held = Held::new(transition, observation, filter.state().len())?;
+        Ok(ExtendedKalmanFilter { filter, held })
     }
 
     /// Move the state on by one sample.
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k). A function gets it as an array, which is empty without it.
+    /// input : float or array_like, optional
+    ///     The same, where the model comes first: ``predict(transition, input)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model; without it the one that the filter holds.
     ///
     /// Raises
     /// ------
@@ -175,14 +189,17 @@ impl ExtendedKalmanFilter {
     ///     If a shape is wrong, or a function returns NaN or infinity. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
-    #[pyo3(signature = (transition, input = None))]
+    #[pyo3(signature = (u = None, input = None, *, transition = None))]
     fn predict(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
         input: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let model = UsedTransition::new(transition, self.filter.state().len())?;
+        let (model, input) = predicted(u, input, transition);
+        let transition = self.held.transition(py, model)?;
+        let model = UsedTransition::new(&transition, self.filter.state().len())?;
         let input = self::input(input, model.inputs())?;
         model.linearise_within(self.filter.covariance());
         let mut filter = self.filter.clone();
@@ -199,12 +216,12 @@ impl ExtendedKalmanFilter {
     ///
     /// Parameters
     /// ----------
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model.
-    /// measurement : float or array_like, shape (m,)
+    /// y : float or array_like, shape (m,)
     ///     y(k). NaN is a missing element: it is skipped alone.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k). A function gets it as an array, which is empty without it.
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model; without it the one that the filter holds.
     ///
     /// Returns
     /// -------
@@ -217,19 +234,21 @@ impl ExtendedKalmanFilter {
     ///     If a shape is wrong, a number too large, or a function returns NaN or infinity. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
-    #[pyo3(signature = (observation, measurement, *, input = None))]
-    fn correct(
+    #[pyo3(signature = (y, u = None, *, observation = None))]
+    fn update(
         &mut self,
         py: Python<'_>,
-        observation: &Bound<'_, PyAny>,
-        measurement: &Bound<'_, PyAny>,
-        input: Option<&Bound<'_, PyAny>>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Innovation> {
+        let (measurement, input) = (y, u);
+        let observation = self.held.observation(py, observation)?;
         let outputs = match argument::is_number(measurement) {
             true => 1,
             false => array::vector("measurement", measurement, None)?.as_slice()?.len(),
         };
-        let model = UsedObservation::new(observation, self.filter.state().len(), Some(outputs))?;
+        let model = UsedObservation::new(&observation, self.filter.state().len(), Some(outputs))?;
         let input = self::input(input, model.inputs())?;
         let (measurement, single) = self::measurement(measurement, model.outputs())?;
         model.linearise_within(self.filter.covariance());
@@ -243,21 +262,36 @@ impl ExtendedKalmanFilter {
         Ok(returned(innovation, single))
     }
 
-    /// Take many samples: at each one `correct`, then `predict`, to the bit.
+    /// The name that `update` had, with the model first. Deprecated.
+    #[pyo3(signature = (observation, measurement, *, input = None))]
+    fn correct(
+        &mut self,
+        py: Python<'_>,
+        observation: &Bound<'_, PyAny>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        renamed(py, "correct(observation, y, input=u)", "update(y, u, observation=observation)")?;
+        self.update(py, measurement, input, Some(observation))
+    }
+
+    /// Take many samples: at each one `update`, then `predict`, to the bit.
     ///
     /// With linear models the interpreter lock is released meanwhile. Afterwards the filter has predicted the sample
     /// after the last.
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model of the measurements.
-    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    /// y : array_like, shape (N, m), or (N,) for m = 1
     ///     NaN is a missing element.
-    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    /// u : array_like, shape (N, inputs), or (N,) for one input, optional
     ///     They go to each function, and to each linear model that has an input.
+    /// measurements, inputs : array_like, optional
+    ///     The same, where the models come first: ``run(transition, observation, measurements, inputs=inputs)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     ///
     /// Returns
     /// -------
@@ -270,20 +304,27 @@ impl ExtendedKalmanFilter {
     ///     As for one step; the message names the row, from 1. Nothing has changed then.
     /// Exception
     ///     Whatever a function raises.
-    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
+    #[pyo3(signature = (y, u = None, measurements = None, *, inputs = None, transition = None, observation = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn run(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
-        observation: &Bound<'_, PyAny>,
-        measurements: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurements: Option<&Bound<'_, PyAny>>,
         inputs: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<FilterTrajectory> {
+        let given = Arguments::new(y, u, measurements, inputs, [transition, observation]);
+        let (measurements, inputs) = (given.measured("measurements")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
         let n = self.filter.state().len();
-        let transition = UsedTransition::new(transition, n)?;
+        let transition = UsedTransition::new(&transition, n)?;
         let measurements = array::numbers("measurements", measurements)?.into_any();
         let outputs = columns("measurements", &measurements)?;
-        let observation = UsedObservation::new(observation, n, Some(outputs))?;
+        let observation = UsedObservation::new(&observation, n, Some(outputs))?;
         let m = observation.outputs();
         let samples = Samples::new(&measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
         let slices = samples.slices()?;
@@ -326,14 +367,16 @@ impl ExtendedKalmanFilter {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model of the measurements.
-    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    /// y : array_like, shape (N, m), or (N,) for m = 1
     ///     NaN is a missing element.
-    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    /// u : array_like, shape (N, inputs), or (N,) for one input, optional
     ///     They go to each function, and to each linear model that has an input.
+    /// measurements, inputs : array_like, optional
+    ///     The same, where the models come first: ``smooth(transition, observation, measurements, inputs=inputs)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     ///
     /// Returns
     /// -------
@@ -343,20 +386,27 @@ impl ExtendedKalmanFilter {
     /// References
     /// ----------
     /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963.
-    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
+    #[pyo3(signature = (y, u = None, measurements = None, *, inputs = None, transition = None, observation = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn smooth(
         &self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
-        observation: &Bound<'_, PyAny>,
-        measurements: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurements: Option<&Bound<'_, PyAny>>,
         inputs: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<SmoothedTrajectory> {
+        let given = Arguments::new(y, u, measurements, inputs, [transition, observation]);
+        let (measurements, inputs) = (given.measured("measurements")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
         let n = self.filter.state().len();
-        let transition = UsedTransition::new(transition, n)?;
+        let transition = UsedTransition::new(&transition, n)?;
         let measurements = array::numbers("measurements", measurements)?.into_any();
         let outputs = columns("measurements", &measurements)?;
-        let observation = UsedObservation::new(observation, n, Some(outputs))?;
+        let observation = UsedObservation::new(&observation, n, Some(outputs))?;
         let wanted = [transition.inputs(), observation.inputs()];
         let samples = Samples::new(&measurements, observation.outputs(), inputs, wanted)?;
         let slices = samples.slices()?;
@@ -412,6 +462,6 @@ impl ExtendedKalmanFilter {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        snapshot(py, "ExtendedKalmanFilter", &self.filter)
+        self.held.snapshot(py, "ExtendedKalmanFilter", &self.filter)
     }
 }

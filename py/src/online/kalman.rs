@@ -1,6 +1,7 @@
 //! The Kalman filter.
 
 use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use thetahat_core::nalgebra::{Const, DMatrix, Dyn, OMatrix, OVector};
 use thetahat_core::{
@@ -9,6 +10,7 @@ use thetahat_core::{
 };
 
 use super::argument::{self, Whole, failed};
+use super::held::{Arguments, Held, predicted, renamed};
 use super::innovation::{Innovation, list};
 use super::model::{LinearObservation, LinearTransition};
 use super::trajectory::{
@@ -16,25 +18,30 @@ use super::trajectory::{
     recorded, returned, smooth, smoothed,
 };
 use super::used::check_states;
-use super::{Reduced, Stop, snapshot};
+use super::{Reduced, Stop};
 use crate::array;
 use crate::work::Pulse;
 
 /// The Kalman filter.
 ///
-/// The models are arguments of each step: they may vary in time, and several sensors may correct one filter.
+/// The models are held by the filter, or given to a step: so they may vary in time, and several sensors may correct one
+/// filter. A filter reads `update(y, u)` and then `predict(u)`, sample after sample.
 ///
 /// Parameters
 /// ----------
 /// state : array_like, shape (n,)
 ///     The mean of the state to start from. For `run` it is that before the first measurement.
-/// covariance : array_like, shape (n, n)
-///     Its covariance.
+/// covariance : float, or array_like of shape (n, n)
+///     Its covariance; a number is the variance of each state.
 /// gate : float, default inf
 ///     A measurement whose normalised innovation squared is above it is not used.
 /// release : int, default 0
 ///     After so many measurements in a row above the gate, those that follow are used, until one is within it again. 0
 ///     is a gate that never lets go: it may lock the filter out for ever.
+/// transition : LinearTransition, optional
+///     The model of the state, of steps that are not given one.
+/// observation : LinearObservation, optional
+///     The model of the measurement, of steps that are not given one.
 ///
 /// Raises
 /// ------
@@ -60,17 +67,18 @@ use crate::work::Pulse;
 /// Examples
 /// --------
 /// >>> from thetahat import KalmanFilter, LinearObservation, LinearTransition
-/// >>> walk = LinearTransition([[1.0]], [[1469.1]])
-/// >>> level = LinearObservation([[1.0]], [[15099.0]])
-/// >>> river = KalmanFilter([0.0], [[1e7]])
-/// >>> river.correct(level, 1120.0).error
+/// >>> walk = LinearTransition([[1.0]], 1469.1)
+/// >>> level = LinearObservation([[1.0]], 15099.0)
+/// >>> river = KalmanFilter([0.0], 1e7, transition=walk, observation=level)
+/// >>> river.update(1120.0).error
 /// 1120.0
 /// >>> river.state.round(6)
 /// array([1118.311462])
-/// >>> river.predict(walk)
+/// >>> river.predict()
 #[pyclass(module = "thetahat")]
 pub(crate) struct KalmanFilter {
     pub(crate) filter: Stepper<f64, Dyn>,
+    pub(super) held: Held,
 }
 
 /// The state, its covariance and the gate, as the arguments of a filter.
@@ -220,42 +228,59 @@ fn with_same_inputs(
 #[pyo3(crate = "crate::in_use")]
 impl KalmanFilter {
     #[new]
-    #[pyo3(signature = (state, covariance, *, gate = f64::INFINITY, release = Whole(0)))]
-    #[pyo3(text_signature = "(state, covariance, *, gate=1e999, release=0)")]
+    #[pyo3(signature = (state, covariance, *, transition = None, observation = None, gate = f64::INFINITY, release = Whole(0)))]
+    #[pyo3(
+        text_signature = "(state, covariance, *, transition=None, observation=None, gate=1e999, release=0)"
+    )]
     fn new(
         py: Python<'_>,
         state: &Bound<'_, PyAny>,
         covariance: &Bound<'_, PyAny>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
         gate: f64,
         release: Whole,
     ) -> PyResult<Self> {
-        Ok(KalmanFilter { filter: started(py, state, covariance, gate, release)? })
+        let filter = started(py, state, covariance, gate, release)?;
+        transition
+            .filter(|model| !model.is_instance_of::<LinearTransition>())
+            .map_or(Ok(()), |model| Err(not_linear("transition", model)))?;
+        observation
+            .filter(|model| !model.is_instance_of::<LinearObservation>())
+            .map_or(Ok(()), |model| Err(not_linear("observation", model)))?;
+        let held = Held::new(transition, observation, filter.state().len())?;
+        Ok(KalmanFilter { filter, held })
     }
 
     /// Move the state on by one sample.
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition
-    ///     The model.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k), if the model has an input.
-    #[pyo3(signature = (transition, input = None))]
+    /// input : float or array_like, optional
+    ///     The same, where the model comes first: ``predict(transition, input)``.
+    /// transition : LinearTransition, optional
+    ///     The model; without it the one that the filter holds.
+    #[pyo3(signature = (u = None, input = None, *, transition = None))]
     fn predict(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, LinearTransition>,
+        u: Option<&Bound<'_, PyAny>>,
         input: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let model = self.transition(transition)?;
+        let (model, input) = predicted(u, input, transition);
+        let transition = self.held.transition(py, model)?;
+        let model = self.transition(&transition)?;
         let input = argument::input(input, model.input_matrix().ncols())?;
         self.filter.predict(model, &input).map_err(|error| failed(py, error))
     }
 
     /// Move the state on by one sample, where process noise and measurement noise are correlated.
     ///
-    /// It comes after `correct` with the same input and measurement. If all of the measurement is missing, or
-    /// `correct` answered "gated", `predict` is the step.
+    /// It comes after `update` with the same input and measurement. If all of the measurement is missing, or
+    /// `update` answered "gated", `predict` is the step.
     ///
     /// Parameters
     /// ----------
@@ -284,8 +309,8 @@ impl KalmanFilter {
     fn predict_correlated(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, LinearTransition>,
-        observation: &Bound<'_, LinearObservation>,
+        transition: &Bound<'_, PyAny>,
+        observation: &Bound<'_, PyAny>,
         cross_covariance: &Bound<'_, PyAny>,
         measurement: &Bound<'_, PyAny>,
         input: Option<&Bound<'_, PyAny>>,
@@ -305,12 +330,12 @@ impl KalmanFilter {
     ///
     /// Parameters
     /// ----------
-    /// observation : LinearObservation
-    ///     The model.
-    /// measurement : float or array_like, shape (m,)
+    /// y : float or array_like, shape (m,)
     ///     y(k). NaN is a missing element: it is skipped alone.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k), if the model has an input.
+    /// observation : LinearObservation, optional
+    ///     The model; without it the one that the filter holds.
     ///
     /// Returns
     /// -------
@@ -323,15 +348,17 @@ impl KalmanFilter {
     ///     If a shape is wrong, or a number infinite or too large. Nothing has changed then.
     /// EstimationError
     ///     If what is measured is known exactly, and measured without noise.
-    #[pyo3(signature = (observation, measurement, *, input = None))]
-    fn correct(
+    #[pyo3(signature = (y, u = None, *, observation = None))]
+    fn update(
         &mut self,
         py: Python<'_>,
-        observation: &Bound<'_, LinearObservation>,
-        measurement: &Bound<'_, PyAny>,
-        input: Option<&Bound<'_, PyAny>>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Innovation> {
-        let model = self.observation(observation)?;
+        let (measurement, input) = (y, u);
+        let observation = self.held.observation(py, observation)?;
+        let model = self.observation(&observation)?;
         let input = argument::input(input, model.input_matrix().ncols())?;
         let (measurement, single) = self::measurement(measurement, model.input_matrix().nrows())?;
         let innovation =
@@ -339,20 +366,35 @@ impl KalmanFilter {
         Ok(returned(innovation, single))
     }
 
-    /// Take many samples: at each one `correct`, then `predict`, to the bit.
+    /// The name that `update` had, with the model first. Deprecated.
+    #[pyo3(signature = (observation, measurement, *, input = None))]
+    fn correct(
+        &mut self,
+        py: Python<'_>,
+        observation: &Bound<'_, PyAny>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        renamed(py, "correct(observation, y, input=u)", "update(y, u, observation=observation)")?;
+        self.update(py, measurement, input, Some(observation))
+    }
+
+    /// Take many samples: at each one `update`, then `predict`, to the bit.
     ///
     /// The interpreter lock is released meanwhile. Afterwards the filter has predicted the sample after the last.
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation
-    ///     The model of the measurements.
-    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    /// y : array_like, shape (N, m), or (N,) for m = 1
     ///     NaN is a missing element.
-    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    /// u : array_like, shape (N, inputs), or (N,) for one input, optional
     ///     They go to each model that has an input.
+    /// measurements, inputs : array_like, optional
+    ///     The same, where the models come first: ``run(transition, observation, measurements, inputs=inputs)``.
+    /// transition : LinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     /// cross_covariance : array_like, shape (n, m), optional
     ///     With it `predict_correlated` takes the place of `predict`, but after a gated measurement.
     ///
@@ -365,17 +407,24 @@ impl KalmanFilter {
     /// ------
     /// ValueError, EstimationError
     ///     As for one step; the message names the row, from 1. Nothing has changed then.
-    #[pyo3(signature = (transition, observation, measurements, *, inputs = None, cross_covariance = None))]
+    #[pyo3(signature = (y, u = None, measurements = None, *, inputs = None, transition = None, observation = None, cross_covariance = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn run(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, LinearTransition>,
-        observation: &Bound<'_, LinearObservation>,
-        measurements: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurements: Option<&Bound<'_, PyAny>>,
         inputs: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
         cross_covariance: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<FilterTrajectory> {
-        let (transition, observation) = (self.transition(transition)?, self.observation(observation)?);
+        let given = Arguments::new(y, u, measurements, inputs, [transition, observation]);
+        let (measurements, inputs) = (given.measured("measurements")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
+        let (transition, observation) = (self.transition(&transition)?, self.observation(&observation)?);
         let (n, m) = (self.filter.state().len(), observation.input_matrix().nrows());
         let wanted = [transition.input_matrix().ncols(), observation.input_matrix().ncols()];
         let samples = Samples::new(measurements, m, inputs, wanted.map(Some))?;
@@ -403,14 +452,16 @@ impl KalmanFilter {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation
-    ///     The model of the measurements.
-    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    /// y : array_like, shape (N, m), or (N,) for m = 1
     ///     NaN is a missing element.
-    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    /// u : array_like, shape (N, inputs), or (N,) for one input, optional
     ///     They go to each model that has an input.
+    /// measurements, inputs : array_like, optional
+    ///     The same, where the models come first: ``smooth(transition, observation, measurements, inputs=inputs)``.
+    /// transition : LinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     ///
     /// Returns
     /// -------
@@ -421,16 +472,23 @@ impl KalmanFilter {
     /// ----------
     /// Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963. Bierman, Fixed interval smoothing
     /// with discrete measurements, 1973.
-    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
+    #[pyo3(signature = (y, u = None, measurements = None, *, inputs = None, transition = None, observation = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn smooth(
         &self,
         py: Python<'_>,
-        transition: &Bound<'_, LinearTransition>,
-        observation: &Bound<'_, LinearObservation>,
-        measurements: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurements: Option<&Bound<'_, PyAny>>,
         inputs: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<SmoothedTrajectory> {
-        let (transition, observation) = (self.transition(transition)?, self.observation(observation)?);
+        let given = Arguments::new(y, u, measurements, inputs, [transition, observation]);
+        let (measurements, inputs) = (given.measured("measurements")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
+        let (transition, observation) = (self.transition(&transition)?, self.observation(&observation)?);
         let (n, m) = (self.filter.state().len(), observation.input_matrix().nrows());
         let wanted = [transition.input_matrix().ncols(), observation.input_matrix().ncols()];
         let samples = Samples::new(measurements, m, inputs, wanted.map(Some))?;
@@ -449,10 +507,10 @@ impl KalmanFilter {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation
-    ///     The model of the measurements.
+    /// transition : LinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     /// maximum_steps : int, default 100000
     ///     After how many samples it gives up, at most 10 million.
     ///
@@ -475,18 +533,20 @@ impl KalmanFilter {
     /// References
     /// ----------
     /// Anderson and Moore, Optimal Filtering, 1979, sections 3.1 and 4.4.
-    #[pyo3(signature = (transition, observation, maximum_steps = Whole(100_000)))]
-    #[pyo3(text_signature = "($self, transition, observation, maximum_steps=100000)")]
+    #[pyo3(signature = (transition = None, observation = None, maximum_steps = Whole(100_000)))]
+    #[pyo3(text_signature = "($self, transition=None, observation=None, maximum_steps=100000)")]
     fn steady_state(
         &self,
         py: Python<'_>,
-        transition: &Bound<'_, LinearTransition>,
-        observation: &Bound<'_, LinearObservation>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
         maximum_steps: Whole,
     ) -> PyResult<SteadyState> {
         let steps = argument::count("maximum_steps", maximum_steps, 1, 10_000_000)?;
+        let transition = self.held.transition(py, transition)?;
+        let observation = self.held.observation(py, observation)?;
         let (transition, observation) =
-            with_same_inputs(py, self.transition(transition)?, self.observation(observation)?)?;
+            with_same_inputs(py, self.transition(&transition)?, self.observation(&observation)?)?;
         let schedule = GainSchedule::new(self.filter.covariance().clone());
         let mut pulse = Pulse::new(transition.state_matrix().nrows().pow(3));
         let mut raised = None;
@@ -545,26 +605,32 @@ impl KalmanFilter {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        snapshot(py, "KalmanFilter", &self.filter)
+        self.held.snapshot(py, "KalmanFilter", &self.filter)
     }
 }
 
 impl KalmanFilter {
-    fn transition<'a>(
-        &self,
-        transition: &'a Bound<'_, LinearTransition>,
-    ) -> PyResult<&'a Moved<f64, Dyn, Dyn>> {
-        let model = &transition.get().model;
+    fn transition<'a>(&self, transition: &'a Bound<'_, PyAny>) -> PyResult<&'a Moved<f64, Dyn, Dyn>> {
+        let linear =
+            transition.cast::<LinearTransition>().map_err(|_| not_linear("transition", transition))?;
+        let model = &linear.get().model;
         check_states("transition", self.filter.state().len(), model.state_matrix().nrows())?;
         Ok(model)
     }
 
     fn observation<'a>(
         &self,
-        observation: &'a Bound<'_, LinearObservation>,
+        observation: &'a Bound<'_, PyAny>,
     ) -> PyResult<&'a Observed<f64, Dyn, Dyn, Dyn>> {
-        let model = &observation.get().model;
+        let linear = observation.cast::<LinearObservation>();
+        let model = &linear.map_err(|_| not_linear("observation", observation))?.get().model;
         check_states("observation", self.filter.state().len(), model.output_matrix().ncols())?;
         Ok(model)
     }
+}
+
+/// What is said of a model that this filter does not take.
+fn not_linear(argument: &str, model: &Bound<'_, PyAny>) -> PyErr {
+    let class = if argument == "transition" { "LinearTransition" } else { "LinearObservation" };
+    PyTypeError::new_err(format!("{argument}: expected a {class}, found {}", argument::kind(model)))
 }

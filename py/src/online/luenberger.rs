@@ -8,10 +8,11 @@ use thetahat_core::{LuenbergerObserver as Stepper, Observation, Transition};
 
 use super::argument::{self, check_size, failed, reserve, shaped};
 use super::extended::{explained, input};
+use super::held::{Arguments, Held};
 use super::innovation::{self, Innovation, list};
 use super::trajectory::{ObserverTrajectory, Samples, Slices, measurement, returned};
 use super::used::{Used, UsedObservation, UsedTransition};
-use super::{Reduced, Stop, snapshot};
+use super::{Reduced, Stop};
 use crate::array;
 use crate::work::Pulse;
 
@@ -23,6 +24,10 @@ use crate::work::Pulse;
 ///     The estimate of the state to start from.
 /// gain : array_like, shape (n, m)
 ///     L. `place` sets it by the poles; it may be the predictor gain of a `SteadyState`.
+/// transition : LinearTransition or NonlinearTransition, optional
+///     The model of the state, of steps that are not given one.
+/// observation : LinearObservation or NonlinearObservation, optional
+///     The model of the measurement, of steps that are not given one.
 ///
 /// Raises
 /// ------
@@ -55,17 +60,29 @@ use crate::work::Pulse;
 #[pyclass(module = "thetahat")]
 pub(crate) struct LuenbergerObserver {
     pub(crate) observer: Stepper<f64, Dyn, Dyn>,
+    pub(super) held: Held,
 }
 
 #[pymethods]
 #[pyo3(crate = "crate::in_use")]
 impl LuenbergerObserver {
     #[new]
-    fn new(py: Python<'_>, state: &Bound<'_, PyAny>, gain: &Bound<'_, PyAny>) -> PyResult<Self> {
+    #[pyo3(signature = (state, gain, *, transition = None, observation = None))]
+    fn new(
+        py: Python<'_>,
+        state: &Bound<'_, PyAny>,
+        gain: &Bound<'_, PyAny>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
         let state = array::finite_vector("state", state, None)?;
         check_size("state", state.len())?;
         let gain = array::finite_matrix("gain", gain, [Some(state.len()), None])?;
-        Ok(LuenbergerObserver { observer: Stepper::new(state, gain).map_err(|error| failed(py, error))? })
+        let held = Held::new(transition, observation, state.len())?;
+        Ok(LuenbergerObserver {
+            observer: Stepper::new(state, gain).map_err(|error| failed(py, error))?,
+            held,
+        })
     }
 
     /// Set the gain so that F - L H has these poles, where F and H are the Jacobians at the estimate.
@@ -135,31 +152,40 @@ impl LuenbergerObserver {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model of the measurement.
-    /// measurement : float or array_like, shape (m,)
+    /// y : float or array_like, shape (m,)
     ///     y(k). NaN is a missing element: its error counts as 0.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k), for each model that has an input.
+    /// measurement, input : array_like, optional
+    ///     The same, where the models come first: ``update(transition, observation, measurement, input=input)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     ///
     /// Returns
     /// -------
     /// Innovation
     ///     The error. An observer knows no variances.
-    #[pyo3(signature = (transition, observation, measurement, *, input = None))]
+    #[pyo3(signature = (y, u = None, measurement = None, *, input = None, transition = None, observation = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn update(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
-        observation: &Bound<'_, PyAny>,
-        measurement: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurement: Option<&Bound<'_, PyAny>>,
         input: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Innovation> {
+        let given = Arguments::new(y, u, measurement, input, [transition, observation]);
+        let (measurement, input) = (given.measured("measurement")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
         let (n, m) = self.observer.gain().shape();
-        let transition = UsedTransition::new(transition, n)?;
-        let observation = self.observed(observation)?;
+        let transition = UsedTransition::new(&transition, n)?;
+        let observation = self.observed(&observation)?;
         let known = transition.inputs().unwrap_or(0).max(observation.inputs().unwrap_or(0));
         let any = transition.inputs().is_none() || observation.inputs().is_none();
         let wanted = if known > 0 || !any { Some(known) } else { None };
@@ -182,31 +208,40 @@ impl LuenbergerObserver {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model of the state.
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model of the measurements.
-    /// measurements : array_like, shape (N, m), or (N,) for m = 1
+    /// y : array_like, shape (N, m), or (N,) for m = 1
     ///     NaN is a missing element.
-    /// inputs : array_like, shape (N, inputs), or (N,) for one input, optional
+    /// u : array_like, shape (N, inputs), or (N,) for one input, optional
     ///     They go to each function, and to each linear model that has an input.
+    /// measurements, inputs : array_like, optional
+    ///     The same, where the models come first: ``run(transition, observation, measurements, inputs=inputs)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model of the state; without it the one that is held.
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model of the measurement; without it the one that is held.
     ///
     /// Returns
     /// -------
     /// ObserverTrajectory
     ///     States and errors, row by row.
-    #[pyo3(signature = (transition, observation, measurements, *, inputs = None))]
+    #[pyo3(signature = (y, u = None, measurements = None, *, inputs = None, transition = None, observation = None))]
+    #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn run(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
-        observation: &Bound<'_, PyAny>,
-        measurements: &Bound<'_, PyAny>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        measurements: Option<&Bound<'_, PyAny>>,
         inputs: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<ObserverTrajectory> {
+        let given = Arguments::new(y, u, measurements, inputs, [transition, observation]);
+        let (measurements, inputs) = (given.measured("measurements")?, given.u);
+        let transition = self.held.transition(py, given.transition)?;
+        let observation = self.held.observation(py, given.observation)?;
         let (n, m) = self.observer.gain().shape();
-        let transition = UsedTransition::new(transition, n)?;
-        let observation = self.observed(observation)?;
+        let transition = UsedTransition::new(&transition, n)?;
+        let observation = self.observed(&observation)?;
         let samples = Samples::new(measurements, m, inputs, [transition.inputs(), observation.inputs()])?;
         let slices = samples.slices()?;
         let mut record = Record {
@@ -252,7 +287,7 @@ impl LuenbergerObserver {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        snapshot(py, "LuenbergerObserver", &self.observer)
+        self.held.snapshot(py, "LuenbergerObserver", &self.observer)
     }
 }
 

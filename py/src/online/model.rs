@@ -15,8 +15,8 @@ use crate::array;
 /// ----------
 /// state_matrix : array_like, shape (n, n)
 ///     F.
-/// noise : array_like, shape (n, n)
-///     Q, the covariance of what the noise adds to the next state.
+/// noise : float, or array_like of shape (n, n)
+///     Q, the covariance of what the noise adds to the next state; a number is the variance of each.
 /// input_matrix : array_like, shape (n, inputs), optional
 ///     G. Without it there is no input.
 ///
@@ -96,8 +96,8 @@ impl LinearTransition {
 /// ----------
 /// output_matrix : array_like, shape (m, n)
 ///     H.
-/// noise : array_like, shape (m, m)
-///     R, the covariance of what the noise adds to the measurement.
+/// noise : float, or array_like of shape (m, m)
+///     R, the covariance of what the noise adds to the measurement; a number is the variance of each element.
 /// input_matrix : array_like, shape (m, inputs), optional
 ///     D. Without it there is no input.
 ///

@@ -5,12 +5,13 @@ use pyo3::prelude::*;
 use thetahat_core::nalgebra::Dyn;
 use thetahat_core::{ExtendedKalmanFilter, OutOfSequenceFilter as Stepper};
 
+use super::Reduced;
 use super::argument::{self, LARGEST_SIZE, Whole, failed};
+use super::held::{Held, predicted, renamed};
 use super::innovation::{Innovation, list};
 use super::kalman::started;
 use super::trajectory::{measurement, returned};
 use super::used::{UsedObservation, UsedTransition};
-use super::{Reduced, snapshot};
 use crate::array;
 
 /// A Kalman filter, extended or not, that takes a measurement of some samples ago.
@@ -23,8 +24,8 @@ use crate::array;
 /// ----------
 /// state : array_like, shape (n,)
 ///     The estimate of the state before the first measurement.
-/// covariance : array_like, shape (n, n)
-///     The covariance of its error.
+/// covariance : float, or array_like of shape (n, n)
+///     The covariance of its error; a number is the variance of each state.
 /// samples : int
 ///     How late a measurement may be, in samples, 1 to 100000.
 /// outputs : int, default 1
@@ -37,6 +38,10 @@ use crate::array;
 ///     After so many measurements in a row above the gate, those that follow are used. 0 is a gate that never lets go.
 /// iterations : int, default 1
 ///     How often a correction linearises the observation.
+/// transition : LinearTransition or NonlinearTransition, optional
+///     The model of the state, of steps that are not given one.
+/// observation : LinearObservation or NonlinearObservation, optional
+///     The model of the measurement, of steps that are not given one.
 ///
 /// Notes ----- The models are arguments, linear or not, as for `ExtendedKalmanFilter`; for a late measurement they must
 /// be those of all the samples since. (A function without its Jacobian is differenced by steps of the deviations that
@@ -52,33 +57,36 @@ use crate::array;
 /// >>> from thetahat import LinearObservation, LinearTransition, OutOfSequenceFilter
 /// >>> drift = LinearTransition([[1.0]], [[0.01]])
 /// >>> both = LinearObservation([[1.0], [1.0]], [[1.0, 0.0], [0.0, 0.01]])  # a coarse probe, and an analysis
-/// >>> tank = OutOfSequenceFilter([0.0], [[100.0]], samples=4, outputs=2)
+/// >>> tank = OutOfSequenceFilter([0.0], 100.0, transition=drift, observation=both, samples=4, outputs=2)
 /// >>> for k in range(20):
-/// ...     innovation = tank.correct(both, [6.0 if k % 2 == 0 else 4.0, nan])
+/// ...     innovation = tank.update([6.0 if k % 2 == 0 else 4.0, nan])
 /// ...     if k == 15:  # of the sample that was taken at k = 12
 /// ...         late = tank.correct_late(drift, both, 3, [nan, 5.0])
-/// ...     tank.predict(drift)
+/// ...     tank.predict()
 /// >>> bool(abs(tank.state[0] - 5.0) < 0.1)
 /// True
 #[pyclass(module = "thetahat")]
 pub(crate) struct OutOfSequenceFilter {
     pub(super) filter: Stepper<f64, Dyn, Dyn, Dyn, Dyn>,
+    pub(super) held: Held,
 }
 
 #[pymethods]
 #[pyo3(crate = "crate::in_use")]
 impl OutOfSequenceFilter {
     #[new]
-    #[pyo3(signature = (state, covariance, *, samples, outputs = Whole(1), inputs = Whole(0), gate = f64::INFINITY,
+    #[pyo3(signature = (state, covariance, *, transition = None, observation = None, samples, outputs = Whole(1), inputs = Whole(0), gate = f64::INFINITY,
         release = Whole(0), iterations = Whole(1)))]
     #[pyo3(
-        text_signature = "(state, covariance, *, samples, outputs=1, inputs=0, gate=1e999, release=0, iterations=1)"
+        text_signature = "(state, covariance, *, transition=None, observation=None, samples, outputs=1, inputs=0, gate=1e999, release=0, iterations=1)"
     )]
     #[expect(clippy::too_many_arguments, reason = "most are options, given by name")]
     fn new(
         py: Python<'_>,
         state: &Bound<'_, PyAny>,
         covariance: &Bound<'_, PyAny>,
+        transition: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
         samples: Whole,
         outputs: Whole,
         inputs: Whole,
@@ -91,10 +99,11 @@ impl OutOfSequenceFilter {
         let inputs = argument::count("inputs", inputs, 0, LARGEST_SIZE)?;
         let iterations = argument::count("iterations", iterations, 1, 1000)?;
         let filter = ExtendedKalmanFilter::from(started(py, state, covariance, gate, release)?);
+        let held = Held::new(transition, observation, filter.state().len())?;
         filter
             .with_iterations(iterations)
             .and_then(|filter| Stepper::new(filter, Dyn(outputs), Dyn(inputs), samples))
-            .map(|filter| OutOfSequenceFilter { filter })
+            .map(|filter| OutOfSequenceFilter { filter, held })
             .map_err(|error| failed(py, error))
     }
 
@@ -102,18 +111,23 @@ impl OutOfSequenceFilter {
     ///
     /// Parameters
     /// ----------
-    /// transition : LinearTransition or NonlinearTransition
-    ///     The model.
-    /// input : float or array_like, shape (inputs,), optional
-    ///     u(k), the one that `correct` had.
-    #[pyo3(signature = (transition, input = None))]
+    /// u : float or array_like, shape (inputs,), optional
+    ///     u(k), the one that `update` had.
+    /// input : float or array_like, optional
+    ///     The same, where the model comes first: ``predict(transition, input)``.
+    /// transition : LinearTransition or NonlinearTransition, optional
+    ///     The model; without it the one that the filter holds.
+    #[pyo3(signature = (u = None, input = None, *, transition = None))]
     fn predict(
         &mut self,
         py: Python<'_>,
-        transition: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
         input: Option<&Bound<'_, PyAny>>,
+        transition: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let model = UsedTransition::new(transition, self.filter.history().states)?;
+        let (model, input) = predicted(u, input, transition);
+        let transition = self.held.transition(py, model)?;
+        let model = UsedTransition::new(&transition, self.filter.history().states)?;
         let input = argument::input(input, self.filter.history().inputs)?;
         model.linearise_within(self.filter.filter().covariance());
         let mut filter = self.filter.clone();
@@ -130,12 +144,12 @@ impl OutOfSequenceFilter {
     ///
     /// Parameters
     /// ----------
-    /// observation : LinearObservation or NonlinearObservation
-    ///     The model of all sensors.
-    /// measurement : float or array_like, shape (outputs,)
+    /// y : float or array_like, shape (outputs,)
     ///     y(k). NaN is an element that is missing, or that will come late.
-    /// input : float or array_like, shape (inputs,), optional
+    /// u : float or array_like, shape (inputs,), optional
     ///     u(k).
+    /// observation : LinearObservation or NonlinearObservation, optional
+    ///     The model of all sensors; without it the one that the filter holds.
     ///
     /// Returns
     /// -------
@@ -147,16 +161,18 @@ impl OutOfSequenceFilter {
     /// ValueError
     ///     If a shape is wrong, a number too large, an element has come before, or a function returns NaN or infinity.
     ///     Nothing has changed then.
-    #[pyo3(signature = (observation, measurement, *, input = None))]
-    fn correct(
+    #[pyo3(signature = (y, u = None, *, observation = None))]
+    fn update(
         &mut self,
         py: Python<'_>,
-        observation: &Bound<'_, PyAny>,
-        measurement: &Bound<'_, PyAny>,
-        input: Option<&Bound<'_, PyAny>>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+        observation: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Innovation> {
+        let (measurement, input) = (y, u);
+        let observation = self.held.observation(py, observation)?;
         let history = self.filter.history();
-        let model = UsedObservation::new(observation, history.states, Some(history.outputs))?;
+        let model = UsedObservation::new(&observation, history.states, Some(history.outputs))?;
         let input = argument::input(input, history.inputs)?;
         let (measurement, single) = self::measurement(measurement, history.outputs)?;
         model.linearise_within(self.filter.filter().covariance());
@@ -168,6 +184,19 @@ impl OutOfSequenceFilter {
         let innovation = corrected.map_err(|error| failed(py, error))?;
         self.filter = filter;
         Ok(returned(innovation, single))
+    }
+
+    /// The name that `update` had, with the model first. Deprecated.
+    #[pyo3(signature = (observation, measurement, *, input = None))]
+    fn correct(
+        &mut self,
+        py: Python<'_>,
+        observation: &Bound<'_, PyAny>,
+        measurement: &Bound<'_, PyAny>,
+        input: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        renamed(py, "correct(observation, y, input=u)", "update(y, u, observation=observation)")?;
+        self.update(py, measurement, input, Some(observation))
     }
 
     /// Take a measurement of some samples ago, and run again from there.
@@ -191,7 +220,7 @@ impl OutOfSequenceFilter {
     /// Raises
     /// ------
     /// ValueError
-    ///     If `age` is too large or not above 0, an element has come before, or as for `correct`. Nothing has changed
+    ///     If `age` is too large or not above 0, an element has come before, or as for `update`. Nothing has changed
     ///     then.
     fn correct_late(
         &mut self,
@@ -254,6 +283,6 @@ impl OutOfSequenceFilter {
     }
 
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Reduced<'py>> {
-        snapshot(py, "OutOfSequenceFilter", &self.filter)
+        self.held.snapshot(py, "OutOfSequenceFilter", &self.filter)
     }
 }

@@ -15,6 +15,7 @@ use thetahat_core::{
 
 use super::argument::{self, LARGEST_SIZE, LONGEST_DELAY, Rows, Whole, count, failed, reserve};
 use super::forgetting::Forgetting;
+use super::held::renamed;
 use super::innovation::{Innovation, list};
 use super::limits::Limits;
 use super::recursive::{self, Around, RecursiveTrajectory};
@@ -234,11 +235,11 @@ pub(crate) fn scales(value: Option<&Bound<'_, PyAny>>, inputs: usize) -> PyResul
 /// The inputs to come, and how many samples they are.
 pub(crate) fn future<'py>(
     inputs: usize,
-    future_inputs: Option<&Bound<'py, PyAny>>,
+    u: Option<&Bound<'py, PyAny>>,
     steps: Option<Whole>,
 ) -> PyResult<(Rows<'py>, usize)> {
     let steps = steps.map(|steps| count("steps", steps, 1, 10_000_000)).transpose()?;
-    let rows = Rows::new("future_inputs", future_inputs, steps, inputs)?;
+    let rows = Rows::new("u", u, steps, inputs)?;
     match (inputs, steps) {
         (0, None) => Err(PyValueError::new_err("steps: expected an int, as there is no input")),
         (0, Some(steps)) => Ok((rows, steps)),
@@ -270,7 +271,7 @@ impl RecursiveModel {
     /// Raises
     /// ------
     /// ValueError
-    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `log_row`
+    ///     If a number is infinite or too large, or an input acts on the output of its own sample (nk = 0): `update`
     ///     takes that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         let output = argument::number("y", y)?;
@@ -316,8 +317,8 @@ impl RecursiveModel {
     /// ------
     /// ValueError
     ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
-    #[pyo3(signature = (y, *, u = None))]
-    fn log_row(
+    #[pyo3(signature = (y, u = None))]
+    fn update(
         &mut self,
         py: Python<'_>,
         y: &Bound<'_, PyAny>,
@@ -330,7 +331,19 @@ impl RecursiveModel {
         Ok(innovation.into())
     }
 
-    /// Take many rows of a log: the same as `log_row` in a loop, to the bit.
+    /// The name that `update` had. Deprecated.
+    #[pyo3(signature = (y, *, u = None))]
+    fn log_row(
+        &mut self,
+        py: Python<'_>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        renamed(py, "log_row(y, u=u)", "update(y, u)")?;
+        self.update(py, y, u)
+    }
+
+    /// Take many rows of a log: the same as `update` in a loop, to the bit.
     ///
     /// The interpreter lock is released meanwhile.
     ///
@@ -349,8 +362,8 @@ impl RecursiveModel {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `log_row`; the message names the row, from 1. Nothing has changed then.
-    #[pyo3(signature = (y, *, u = None))]
+    ///     As for `update`; the message names the row, from 1. Nothing has changed then.
+    #[pyo3(signature = (y, u = None))]
     fn run(
         &mut self,
         py: Python<'_>,
@@ -378,9 +391,9 @@ impl RecursiveModel {
     ///
     /// Parameters
     /// ----------
-    /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
+    /// u : array_like, shape (steps,) for one input, or (steps, inputs); None without input
     ///     The inputs to come, as many as outputs. After `measured` of y(k) the first is u(k), which is still to be
-    ///     chosen; after `applied` or `log_row` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then,
+    ///     chosen; after `applied` or `update` of u(k) it is u(k+1). (With nk = 1 the last one acts on nothing then,
     ///     but is there.)
     /// steps : int, optional
     ///     How many; it is needed without input only.
@@ -389,14 +402,14 @@ impl RecursiveModel {
     /// -------
     /// ndarray, shape (steps,)
     ///     The predictions; NaN where one depends on a missing sample.
-    #[pyo3(signature = (future_inputs = None, steps = None))]
+    #[pyo3(signature = (u = None, steps = None))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
-        future_inputs: Option<&Bound<'py, PyAny>>,
+        u: Option<&Bound<'py, PyAny>>,
         steps: Option<Whole>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (inputs, steps) = future(self.engine.inputs, future_inputs, steps)?;
+        let (inputs, steps) = future(self.engine.inputs, u, steps)?;
         let mut outputs = reserve(&[steps])?;
         outputs.resize(steps, 0.0);
         let inputs = inputs.as_slice()?;

@@ -8,6 +8,7 @@ use thetahat_core::{ArxOrders, RecursiveLeastSquares as LeastSquares, RecursiveV
 
 use super::argument::{self, Rows, Whole, failed, reserve};
 use super::forgetting::{Forgetting, Memory, STANDARD};
+use super::held::renamed;
 use super::innovation::{Innovation, list};
 use super::recursive::{self, Around, RecursiveTrajectory};
 use super::recursive_model::{future, orders, scales};
@@ -205,7 +206,7 @@ impl RecursiveVectorArx {
     /// ------
     /// ValueError
     ///     If a shape is wrong, a number infinite or too large, or an input acts on the outputs of its own sample (nk =
-    ///     0): `log_row` takes that. Nothing has changed then, time included.
+    ///     0): `update` takes that. Nothing has changed then, time included.
     fn measured(&mut self, py: Python<'_>, y: &Bound<'_, PyAny>) -> PyResult<Innovation> {
         self.measure(y)?;
         let innovation = self.engine.stepper.measured(&self.outputs).map_err(|error| failed(py, error))?;
@@ -228,7 +229,7 @@ impl RecursiveVectorArx {
         self.engine.stepper.applied(&self.inputs).map_err(|error| failed(py, error))
     }
 
-    /// Take one row of a log: y(k) and u(k), recorded at the same instant; see `RecursiveArx.log_row`.
+    /// Take one row of a log: y(k) and u(k), recorded at the same instant; see `RecursiveArx.update`.
     ///
     /// Parameters
     /// ----------
@@ -246,8 +247,8 @@ impl RecursiveVectorArx {
     /// ------
     /// ValueError
     ///     If a shape is wrong, a number infinite or too large. Nothing has changed then, time included.
-    #[pyo3(signature = (y, *, u = None))]
-    fn log_row(
+    #[pyo3(signature = (y, u = None))]
+    fn update(
         &mut self,
         py: Python<'_>,
         y: &Bound<'_, PyAny>,
@@ -260,7 +261,19 @@ impl RecursiveVectorArx {
         Ok(Innovation::vector(taken.map_err(|error| failed(py, error))?))
     }
 
-    /// Take many rows of a log: the same as `log_row` in a loop, to the bit.
+    /// The name that `update` had. Deprecated.
+    #[pyo3(signature = (y, *, u = None))]
+    fn log_row(
+        &mut self,
+        py: Python<'_>,
+        y: &Bound<'_, PyAny>,
+        u: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Innovation> {
+        renamed(py, "log_row(y, u=u)", "update(y, u)")?;
+        self.update(py, y, u)
+    }
+
+    /// Take many rows of a log: the same as `update` in a loop, to the bit.
     ///
     /// The interpreter lock is released meanwhile.
     ///
@@ -279,8 +292,8 @@ impl RecursiveVectorArx {
     /// Raises
     /// ------
     /// ValueError
-    ///     As for `log_row`; the message names the row, from 1. Nothing has changed then.
-    #[pyo3(signature = (y, *, u = None))]
+    ///     As for `update`; the message names the row, from 1. Nothing has changed then.
+    #[pyo3(signature = (y, u = None))]
     fn run(
         &mut self,
         py: Python<'_>,
@@ -309,7 +322,7 @@ impl RecursiveVectorArx {
     ///
     /// Parameters
     /// ----------
-    /// future_inputs : array_like, shape (steps,) for one input, or (steps, inputs); None without input
+    /// u : array_like, shape (steps,) for one input, or (steps, inputs); None without input
     ///     The inputs to come, as many as samples; which is the first is said at `RecursiveArx.predict`.
     /// steps : int, optional
     ///     How many; it is needed without input only.
@@ -318,14 +331,14 @@ impl RecursiveVectorArx {
     /// -------
     /// ndarray, shape (steps, outputs)
     ///     The predictions; NaN where one depends on a missing sample.
-    #[pyo3(signature = (future_inputs = None, steps = None))]
+    #[pyo3(signature = (u = None, steps = None))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
-        future_inputs: Option<&Bound<'py, PyAny>>,
+        u: Option<&Bound<'py, PyAny>>,
         steps: Option<Whole>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let (inputs, steps) = future(self.engine.inputs, future_inputs, steps)?;
+        let (inputs, steps) = future(self.engine.inputs, u, steps)?;
         let l = self.outputs.len();
         let mut outputs = reserve(&[steps, l])?;
         outputs.resize(steps * l, 0.0);

@@ -445,22 +445,35 @@ impl Tracker {
     /// [`Error::Argument`] if the steps are not in 1 … 10,000; for one of several outputs, which
     /// [`forecasts`](crate::track::forecasts) is for.
     pub fn forecast(&mut self, steps: usize) -> Result<f64, Error> {
+        let last = self.predict(None, steps)?.and_then(|predicted| predicted.last()).copied();
+        Ok(last.map_or(f64::NAN, |predicted| predicted + self.offsets.output))
+    }
+
+    /// The predictions of so many steps less the offset of the output; none before there is an estimate. `future` are
+    /// the inputs of these steps, a row each, in their units.
+    pub(super) fn predict(&mut self, future: Option<&[f64]>, steps: usize) -> Result<Option<&[f64]>, Error> {
         check_steps(steps)?;
         if self.outputs > 0 {
             let message = "this output depends on the past of the others; forecast all of them";
             return Err(Error::argument("outputs", message));
         }
-        let Stage::Running(estimator) = &self.stage else { return Ok(f64::NAN) };
+        let Stage::Running(estimator) = &self.stage else { return Ok(None) };
         if !self.has_estimate {
-            return Ok(f64::NAN);
+            return Ok(None);
         }
         let Workspace { lines, inputs, outputs } = &mut self.workspace;
         let lines = lines.get_or_insert_with(|| estimator.lines().clone());
         outputs.resize(steps, f64::NAN);
         inputs.clear();
-        (0..steps).for_each(|_| inputs.extend_from_slice(&self.inputs));
+        match future {
+            None => (0..steps).for_each(|_| inputs.extend_from_slice(&self.inputs)),
+            Some(future) => {
+                let offsets = self.offsets.inputs.iter().cycle();
+                inputs.extend(future.iter().zip(offsets).map(|(input, offset)| input - offset));
+            }
+        }
         estimator.predict(lines, inputs, outputs);
-        Ok(outputs.last().map_or(f64::NAN, |&predicted| predicted + self.offsets.output))
+        Ok(Some(outputs))
     }
 
     /// The names of the parameters, in their order: those of [`Orders::names`], with `constant` after those of B if

@@ -5,9 +5,30 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import wraps
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from typing_extensions import deprecated as deprecated
+else:
+
+    def deprecated(message: str) -> Callable[[Any], Any]:
+        """A method that still works, and says that it has another name: PEP 702, for Pythons that do not have it."""
+
+        def of(method: Any) -> Any:
+            @wraps(method)
+            def called(*arguments: Any, **options: Any) -> Any:
+                warn(message, DeprecationWarning)
+                return method(*arguments, **options)
+
+            called.__deprecated__ = message
+            return called
+
+        return of
+
 
 _kept: ContextVar[list[str] | None] = ContextVar("kept", default=None)
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from thetahat import _thetahat
 from thetahat.base import clock as _clock, numbers as _numbers, picture as _picture
+from thetahat.base.said import deprecated
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.values import Duration
 from thetahat.fits.grey_box import GreyBox
@@ -263,7 +264,7 @@ class StateFilter:
     >>> trajectory = filter.run(log[700:])
     >>> trajectory.filtered.shape
     (300, 2)
-    >>> filter.step(log.y[-1], log.u[-1]).action
+    >>> filter.update(log.y[-1], log.u[-1]).action
     'updated'
     """
 
@@ -302,7 +303,7 @@ class StateFilter:
         self.estimator = ("kalman" if seen.is_linear else "ekf") if estimator is None else estimator
         self._last: _rows.Last | None = None
 
-    def step(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, seconds: Duration | None = None) -> StateEstimate:
+    def update(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, seconds: Duration | None = None) -> StateEstimate:
         """Take one row.
 
         Parameters
@@ -331,6 +332,42 @@ class StateFilter:
             self._last = _rows.Last(self._last.seconds + (self.sample_time if step is None else step))
         return found
 
+    @deprecated("step is deprecated: its name is update")
+    def step(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, seconds: Duration | None = None) -> StateEstimate:
+        """The name that `update` had. Deprecated."""
+        return self.update(y, u, seconds=seconds)
+
+    def predict(self, u: npt.ArrayLike | None = None, steps: int | None = None) -> Array:
+        """The outputs to come, y(k+1), y(k+2), …, y(k) being that of the latest row.
+
+        Parameters
+        ----------
+        u : array_like, shape (steps,) or (steps, k), optional
+            The inputs of these rows, in their own units. Without them the latest ones are held.
+        steps : int, optional
+            How many, 1 to 10000; with ``u`` as many as that has rows, else 1.
+
+        Returns
+        -------
+        ndarray, shape (steps,), or (steps, m) where there are several outputs
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> filter = th.StateFilter(th.arx(log[:700], na=2, nb=2))
+        >>> _ = filter.run(log[700:900])
+        >>> filter.predict(log.u[900:903]).shape
+        (3,)
+        """
+        count = len(self.inputs)
+        if u is None:
+            future = np.full((_options.count("steps", 1 if steps is None else steps, 10_000), count), np.nan)
+        else:
+            future = _rows.future(u, count, steps)
+        found = self._filter.predict(future, len(future))
+        return found[:, 0] if found.shape[1] == 1 else found
+
     def run(
         self,
         data: _rows.Data,
@@ -340,7 +377,7 @@ class StateFilter:
         sample_time: Duration | None = None,
         smooth: bool = False,
     ) -> StateTrajectory:
-        """Take many rows: the same as `step` in a loop, to the bit.
+        """Take many rows: the same as `update` in a loop, to the bit.
 
         The interpreter lock is released meanwhile. Rows go on from those before them: of two parts of a log the second follows the
         first.

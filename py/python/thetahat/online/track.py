@@ -13,6 +13,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat._thetahat import Forgetting
 from thetahat.base import clock as _clock, numbers as _numbers
+from thetahat.base.said import deprecated
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.values import Duration
 from thetahat.models.model import Model
@@ -123,7 +124,7 @@ class Tracker:
     (900, 4, 2)
     >>> tracker.parameters[:, 1].round(2)
     array([-1.54,  0.58,  0.36,  0.32])
-    >>> tracked = tracker.log_row(log.y[900], log.u[900], time=log.time[900])
+    >>> tracked = tracker.update(log.y[900], log.u[900], time=log.time[900])
     >>> tracked.action.tolist()
     ['updated', 'updated']
     """
@@ -259,7 +260,7 @@ class Tracker:
         """Write the state to a file, whole or not at all."""
         _thetahat.write(_files.name(path), self.state())
 
-    def log_row(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
+    def update(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
         """Take one row of a log: y(k) and u(k), recorded at the same instant.
 
         Parameters
@@ -280,37 +281,58 @@ class Tracker:
         ValueError
             If a shape is wrong, a value infinite, or the time not after that of the row before. Nothing has changed then.
         """
-        measured = _numbers.array("y", y)
-        count = len(self.outputs)
-        if measured.size != count:
-            raise ValueError(f"y: expected {'a number' if count == 1 else f'{count} numbers'}, found shape {measured.shape}")
-        driving = np.empty((1, 0)) if u is None else _numbers.array("u", u).reshape(1, -1)
-        if driving.shape[1] != len(self.inputs):
-            raise ValueError(f"u: expected {len(self.inputs)} numbers, found {driving.shape[1]}")
-        seconds = None if time is None else np.array([float(_options.number("time", time))])
-        rows = _rows.Rows(driving, measured.reshape(1, count), seconds, None, _clock.Clock(), name=None if time is None else "time")
-        found = self._run(rows, stop_on_alarm=False)
-        actions = np.where(found["too_large"], "too large", found["actions"])
-        return Tracked(
-            predicted=self._one(found["predicted"][0]),
-            error=self._one(found["errors"][0]),
-            variance=self._one(found["variances"][0]),
-            nis=self._one(found["nis"][0]),
-            action=self._one(actions),
-            excitation=self._one(found["excitation"][0]),
-            forecast=self._one(found["forecasts"][0]),
-            alarms=found["alarms"],
-        )
+        seconds = None if time is None else float(_options.number("time", time))
+        found = self._tracker.row(y, u, seconds)
+        if isinstance(found[0], float):
+            return Tracked._make(found)
+        *columns, alarms = found
+        predicted, error, variance, nis, action, excitation, forecast = (self._one(np.asarray(column)) for column in columns)
+        return Tracked(predicted, error, variance, nis, action, excitation, forecast, alarms)
+
+    @deprecated("log_row is deprecated: its name is update")
+    def log_row(self, y: npt.ArrayLike, u: npt.ArrayLike | None = None, *, time: float | None = None) -> Tracked:
+        """The name that `update` had. Deprecated."""
+        return self.update(y, u, time=time)
+
+    def predict(self, u: npt.ArrayLike | None = None, steps: int | None = None) -> Array:
+        """The outputs to come, y(k+1), y(k+2), …, y(k) being that of the latest row.
+
+        Parameters
+        ----------
+        u : array_like, shape (steps,) or (steps, inputs), optional
+            The inputs of these rows, in their own units. Without them the latest ones are held.
+        steps : int, optional
+            How many, 1 to 10000; with ``u`` as many as that has rows, else 1.
+
+        Returns
+        -------
+        ndarray, shape (steps,)
+            In the units of the log. With several outputs an axis for these follows, with several ways to forget a last one. NaN before
+            there is an estimate, and where it depends on a missing sample.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> tracker = th.Tracker(na=2, nb=2)
+        >>> _ = tracker.run(log[:900])
+        >>> bool(np.all(np.abs(tracker.predict(log.u[900:905]) - log.y[900:905]) < 10))
+        True
+        """
+        future = None if u is None else _rows.future(u, len(self.inputs), steps)
+        count = len(future) if future is not None else 1 if steps is None else steps
+        return shaped(self._tracker, self._tracker.predict(future, _options.count("steps", count, 10_000)), 1)
 
     def run(
         self,
         data: _rows.Data,
-        *,
         u: _numbers.Columns | None = None,
+        *,
         time: _rows.Times | None = None,
         stop_on_alarm: bool = False,
     ) -> TrackTrajectory:
-        """Take many rows: the same as `log_row` in a loop, to the bit.
+        """Take many rows: the same as `update` in a loop, to the bit.
 
         The interpreter lock is released meanwhile. Rows go on from those before them: of two parts of a log the second follows the
         first.

@@ -45,7 +45,7 @@ class Tracked(NamedTuple):
     forecast: float | Array
     """The output ``horizon`` rows later; NaN if there is none, or none was asked for."""
     alarms: list[Alarm]
-    """The changes that were noticed; this row is their row 0."""
+    """The changes that were noticed; their row is this one, counted from 0 since the first."""
 
 
 class TrackTrajectory:

@@ -118,7 +118,7 @@ plot.bode({"ARX": arx, "chosen": model})
 # 95 of 100 samples. We count.
 
 # %%
-low, high = model.predict_interval(test, horizon=10)
+low, high = model.predict_interval(test, horizon=10).T
 there = np.isfinite(low) & np.isfinite(test.y)
 coverage = float(np.mean((low <= test.y)[there] & (test.y <= high)[there]))
 print(f"{100 * coverage:.0f} % of the samples lie in the band")
@@ -131,7 +131,7 @@ plot.fit(model, test, horizon=10)
 # %%
 known, later = test[:200], test[200:230]
 forecast = model.forecast(known, len(later), later.u)
-lower, upper = forecast.interval()
+lower, upper = forecast.interval().T
 figure, ax = plt.subplots()
 ax.plot(later.time, later.y, ".", label="measured")
 ax.plot(forecast.time, forecast.values, label="forecast")

@@ -133,7 +133,7 @@ def test_a_fit_is_a_model_with_every_method(tmp_path: Path) -> None:
     assert (model.kind, model.name, model.outputs, model.inputs) == ("equations", "equations, 1 state", ["y"], ["u"])
     assert model.parameter_names == ["area"] and abs(model.parameters[0] - 2) < 4 * model.standard_errors[0]
     assert model.predict(log, 3).shape == (400,) and model.simulate(log).shape == (400,)
-    low, high = model.predict_interval(log, 5)
+    low, high = model.predict_interval(log, 5).T
     inside = np.mean((low < log.y) & (log.y < high))
     assert 0.9 < inside < 0.99
     assert model.simulate([1.0] * 5).shape == (5,)

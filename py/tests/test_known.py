@@ -119,3 +119,31 @@ def test_pade_is_all_pass_and_right_at_low_frequencies() -> None:
 def test_bad_numbers(make: Any, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=message):
         make()
+
+
+def test_systems_of_other_packages_are_models_where_models_are_asked_for() -> None:
+    control = pytest.importorskip("control")
+    known = control.tf([0.36, 0.32], [1, -1.54, 0.58], dt=0.01)
+    log = th.dc_motor()
+    assert repr(th.compare({"known": known, "arx": th.arx(log, 2, 2)}, log)) == "Comparison(known, arx)"
+    gains = th.lqr(known, 1.0)
+    assert th.lqr(th.Model.from_control(known), 1.0).to_json() == gains.to_json()
+    controller = th.RstController([0.1], [1.0], [0.1])
+    assert th.closed_loop(controller, known, np.ones(50), noise=False).y.shape == (50,)
+    for call in (lambda: th.lqr("arx", 1.0), lambda: th.compare({"a": 1}, log), lambda: th.closed_loop(controller, 3, np.ones(5))):  # type: ignore[dict-item, arg-type]
+        with pytest.raises(TypeError, match="expected a Model"):
+            call()
+    with pytest.raises(TypeError, match=r"found a Model; compare\(\[model, another\], log\)"):
+        th.compare(th.arx(log, 2, 2), log)  # type: ignore[arg-type]
+
+
+def test_models_in_matrices_and_equations_run_freely() -> None:
+    matrices = th.StateModel([[0.9, 0.1], [0, 0.8]], [[1, 0], [0, 1]], np.eye(2), np.eye(2), np.eye(2), G=[[0], [1]], sample_time=1, x0=[1, 2])
+    u = np.sin(np.arange(20.0))
+    x, expected = np.array([1.0, 2.0]), []
+    for value in u:
+        expected.append(x)
+        x = np.array([[0.9, 0.1], [0, 0.8]]) @ x + np.array([0.0, value])
+    np.testing.assert_allclose(matrices.simulate(u), expected, atol=1e-12)
+    with pytest.raises(ValueError, match="u: expected shape"):
+        matrices.simulate([[1.0, 2.0]])

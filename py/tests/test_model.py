@@ -30,7 +30,7 @@ def test_predictions_meet_the_free_run(motor: th.Log) -> None:
     assert np.array_equal(model.predict(motor, None, initial="zero"), model.simulate(motor.u))
     assert np.array_equal(model.simulate(motor.u), model.simulate(motor, initial="zero"))
     assert np.allclose(model.simulate(motor.u[:, 0])[:700], model.simulate(motor[:700].u), atol=1e-12)
-    lower, upper = model.predict_interval(motor, 5)
+    lower, upper = model.predict_interval(motor, 5).T
     values = model.predict(motor, 5)
     assert np.allclose((lower + upper) / 2, values, equal_nan=True)
     inside = (lower < motor.y) & (motor.y < upper)
@@ -111,7 +111,7 @@ def test_a_forecast_goes_on_where_the_log_ends(motor: th.Log) -> None:
     for k in range(1, 5):
         assert np.isclose(ahead.values[k - 1], model.predict(motor[:904], k)[900 + k - 1], rtol=1e-9)
     assert np.allclose(ahead.time, motor.time[900:904]) and (np.diff(ahead.standard_deviations) > 0).all()
-    lower, upper = ahead.interval()
+    lower, upper = ahead.interval().T
     assert (lower < ahead.values).all() and (ahead.values < upper).all()
     series = th.ar(motor, 2)
     assert series.forecast(motor, 3).values.shape == (3,)

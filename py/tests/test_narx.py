@@ -196,7 +196,7 @@ def test_several_outputs_are_a_map_each() -> None:
     run = model.simulate(data)
     assert run.shape == (800, 2)
     assert np.nanstd(y - run, axis=0) == pytest.approx([0.025, 0.022], rel=0.4)
-    lower, upper = model.predict_interval(data, 3)
+    lower, upper = model.predict_interval(data, 3).T
     inside = (y > lower) & (y < upper)
     assert inside[3:].mean() == pytest.approx(0.95, abs=0.03)
     checked = model.validate(data, rows=slice(600, 800), require=["fit>=90"])
@@ -272,7 +272,7 @@ def test_trained_maps_run_better_than_a_line(map: str) -> None:
 def test_free_runs_have_intervals_where_rows_were_held_out() -> None:
     log = saturating()
     held_out = th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1, estimate="1..400", validate="401..600")
-    low, high = held_out.predict_interval(log, None)
+    low, high = held_out.predict_interval(log, None).T
     run = held_out.predict(log, None)
     assert np.all(low[5:] < run[5:]) and np.all(run[5:] < high[5:])
     for other in (th.narx(log, "tanh", ny=1, nu=1, units=2, ridge=0.1), th.arx(log, 1, 1)):

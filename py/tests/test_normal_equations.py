@@ -68,7 +68,7 @@ def test_the_model_does_what_others_do(log: th.Log) -> None:
     whole = th.arx(log, **ORDERS)
     np.testing.assert_allclose(model.predict(log), whole.predict(log), rtol=1e-10, equal_nan=True)
     np.testing.assert_allclose(model.simulate(np.ones((50, 2))), whole.simulate(np.ones((50, 2))), rtol=1e-10)
-    np.testing.assert_allclose(model.predict_interval(log)[0], whole.predict_interval(log)[0], rtol=1e-10, equal_nan=True)
+    np.testing.assert_allclose(model.predict_interval(log), whole.predict_interval(log), rtol=1e-10, equal_nan=True)
     validated = model.validate(log[2000:])
     assert validated.fit(1) == pytest.approx(whole.validate(log[2000:]).fit(1))
     assert th.Model.from_json(model.to_json()) == model

@@ -133,7 +133,7 @@ def test_fit_draws_what_was_measured_and_what_is_predicted(log: th.Log, model: t
     x, low, high = edges(band)
     there = np.isfinite(model.predict(test, 5))
     np.testing.assert_array_equal(x, test.time[there])
-    lower, upper = model.predict_interval(test, 5)
+    lower, upper = model.predict_interval(test, 5).T
     np.testing.assert_allclose(low, lower[there], rtol=1e-12)
     np.testing.assert_allclose(high, upper[there], rtol=1e-12)
     assert is_inked(ax)

@@ -66,7 +66,7 @@ def test_the_plant_is_found_and_every_method_takes_it() -> None:
     assert model.predict(data).shape == model.residuals(data).shape == (1500, 2)
     assert np.std(model.residuals(data), axis=0) == pytest.approx([0.2, 0.2], rel=0.1)
     assert model.simulate(data).shape == (1500, 2)
-    low, high = model.predict_interval(data, 3)
+    low, high = np.moveaxis(model.predict_interval(data, 3), -1, 0)
     inside = (low[2:] <= data_outputs(data)[2:]) & (data_outputs(data)[2:] <= high[2:])
     assert np.mean(inside, axis=0) == pytest.approx([0.95, 0.95], abs=0.03)
     forecast = model.forecast(data[:1400], 5, data.u[1400:1405])

@@ -90,6 +90,45 @@ class Labels(NamedTuple):
         hint = "; where summer time ends, give the times their time zone (tz_localize in pandas)" if summer else ""
         return f"time goes back from {before} in row {row + 1} to {after} in row {row + 2}; sort the rows by time first{hint}"
 
+    def between(self, start: Any, stop: Any) -> slice:
+        """The rows from an instant to another one, both included. A text without a time of day is the whole day, month or year; one
+        without a time zone is of the zone of the log."""
+        values = self.values
+        if values.dtype.kind != "M":
+            raise TypeError("rows: the log has no dates; cut it by rows, such as log[:500]")
+        if (np.diff(values) < np.timedelta64(0)).any():
+            raise ValueError("rows: the dates of the log do not rise; cut its experiments one by one")
+        first = 0 if start is None else int(np.searchsorted(values, self._instants(start)[0], "left"))
+        if stop is None:
+            return slice(first, len(values))
+        begins, ends = self._instants(stop)
+        last = np.searchsorted(values, begins, "right") if ends is None else np.searchsorted(values, ends, "left")
+        return slice(first, int(last))
+
+    def _instants(self, value: Any) -> tuple[np.datetime64, np.datetime64 | None]:
+        """Where an instant begins, and where the day, month, minute or other part that a text names ends."""
+        if not isinstance(value, str):
+            labels = read("rows", [value])
+            if labels.values.dtype.kind != "M":
+                raise TypeError(f"rows: {value!r} is no date; rows are counted by whole numbers")
+            return labels.values[0], None
+        found = ISO_8601.fullmatch(value.strip())
+        if found is not None and found.group(3) is not None:
+            return read("rows", [value]).values[0], None
+        try:
+            partial = np.datetime64(value.strip().replace(" ", "T").replace(",", "."))
+        except ValueError:
+            raise ValueError(f"rows: {value!r} is no date such as '2026-03-01' or '2026-03-01 12:30'; rows are counted by numbers") from None
+        return self._in_utc(partial), self._in_utc(partial + 1)
+
+    def _in_utc(self, local: np.datetime64) -> np.datetime64:
+        """What the clocks on the wall of the zone show as this."""
+        zone = None if self.zone is None else _tzinfo(self.zone)
+        if zone is None:
+            return local
+        instant = local.astype("datetime64[us]").item().replace(tzinfo=zone)
+        return np.datetime64(instant.astimezone(datetime.timezone.utc).replace(tzinfo=None), "us")
+
     def text(self, row: int = 0) -> str:
         """A time as ISO 8601 writes it, where the clocks on the wall of its zone show it; a duration in seconds."""
         value = self.values[row]
@@ -111,10 +150,10 @@ class Labels(NamedTuple):
     def to_pandas(self) -> Any:
         """As an index."""
         if isinstance(self.name, tuple):
-            return _imported("pandas").MultiIndex.from_tuples(self.values, names=self.name)
+            return imported("pandas").MultiIndex.from_tuples(self.values, names=self.name)
         if self._is_counted:
-            return _imported("pandas").Index(self.values.astype(np.int64), name=self.name)
-        index = _imported("pandas").Index(self.values, name=self.name)
+            return imported("pandas").Index(self.values.astype(np.int64), name=self.name)
+        index = imported("pandas").Index(self.values, name=self.name)
         if self.zone is not None:
             index = index.tz_localize("UTC").tz_convert(self.zone)
         if self.rule is not None:
@@ -123,7 +162,7 @@ class Labels(NamedTuple):
 
     def to_polars(self) -> Any:
         """As a series."""
-        polars = _imported("polars")
+        polars = imported("polars")
         values, name = self.values, "time" if self.name is None else str(self.name)
         if self._is_counted:
             return polars.Series(name, self.values.astype(np.int64))
@@ -281,7 +320,7 @@ def _joined(labels: Sequence[Labels | None]) -> Labels | None:
 
 def to_pandas(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) -> Any:
     """A data frame of columns with the index that the log came with, or its times."""
-    pandas = _imported("pandas")
+    pandas = imported("pandas")
     times = Labels(seconds, "time") if clock.times is None else clock.times
     if clock.rows is None:
         return pandas.DataFrame(columns, times.to_pandas())
@@ -294,7 +333,7 @@ def to_pandas(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) ->
 
 def to_polars(clock: Clock, seconds: _numbers.Array, columns: dict[str, Any]) -> Any:
     """A data frame of columns after one of times, or of the numbers that the rows have."""
-    polars = _imported("polars")
+    polars = imported("polars")
     labels = Labels(seconds, "time")
     if clock.times is not None:
         labels = clock.times
@@ -559,7 +598,8 @@ def _tzinfo(zone: Any) -> datetime.tzinfo | None:
     return made
 
 
-def _imported(name: str) -> Any:
+def imported(name: str) -> Any:
+    """A package that not everybody has."""
     try:
         return import_module(name)
     except ImportError as error:

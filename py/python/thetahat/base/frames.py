@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
+Frame = Any
+"""A data frame of pandas, Polars, PyArrow or another library that Narwhals reads."""
+
+
 def name_of(label: Any) -> str:
     """What a column of this label is called: labels may be numbers, or tuples of a MultiIndex."""
     return label if isinstance(label, str) else ".".join(map(str, label)) if isinstance(label, tuple) else str(label)
@@ -61,6 +65,16 @@ def columns(frame: Any, names: Sequence[str]) -> dict[str, NDArray[np.float64]]:
         message = f"columns: {_numbers.twice(names)!r} is asked for twice; name each column once"
         raise ValueError(message)
     return {name: _numbers.series(f"column {name!r}", _column(table, name)) for name in names}
+
+
+def names(frame: Any) -> list[str]:
+    """What the columns are called."""
+    return list(_table(frame).columns)
+
+
+def with_missing(frame: Any, names: Sequence[str]) -> Any:
+    """The frame with columns of which all is missing."""
+    return _table(frame).with_columns(*(nw.lit(float("nan")).alias(name) for name in names)).to_native()
 
 
 def clock(frame: Any, name: str) -> _clock.Clock:

@@ -132,8 +132,7 @@ def _designed(
     observer: complex | Sequence[complex] | None = None,
     cancel_zeros: bool = False,
 ) -> Control:
-    if not isinstance(model, Model):
-        raise TypeError(f"model: expected a Model, found {type(model).__name__}")
+    model = Model._read("model", model)
     low, high = (None, None) if limits is None else limits
     return Control(
         *_thetahat.control(
@@ -355,9 +354,11 @@ def closed_loop(
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ValueError("set_point: expected finite numbers, one for each sample")
     loads = np.broadcast_to(np.asarray(load, dtype=np.float64), wanted.shape)
-    step = _stepped(plant, len(wanted), noise, seed) if isinstance(plant, Model) else plant
-    if not callable(step):
-        raise TypeError(f"plant: expected a Model or a function, found {type(plant).__name__}")
+    # A system of python-control can be called, too, with a frequency.
+    if isinstance(plant, Model) or hasattr(plant, "dt") or not callable(plant):
+        step = _stepped(Model._read("plant", plant), len(wanted), noise, seed)
+    else:
+        step = plant
     measured, applied = np.empty(len(wanted)), np.empty(len(wanted))
     u = 0.0
     for sample, target in enumerate(wanted):

@@ -95,8 +95,7 @@ def tune(
     -----
     Skogestad, J. Process Control 13, 2003; Åström and Hägglund, Advanced PID Control, 2006, section 6.5.
     """
-    if not isinstance(model, Model):
-        raise TypeError(f"model: expected a Model, found {type(model).__name__}")
+    model = Model._read("model", model)
     named = None if input is None else _options.text("input", input)
     lasts = None if closed_loop_time is None else _options.seconds("closed_loop_time", closed_loop_time)
     which = None if controller is None else _options.text("controller", controller)

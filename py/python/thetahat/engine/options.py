@@ -11,6 +11,7 @@ import json
 import math
 import operator
 import os
+import re
 from collections.abc import Mapping, Sequence
 from statistics import NormalDist
 from typing import Any, Callable, Literal, Optional, TypedDict, TypeVar, Union, cast
@@ -229,8 +230,12 @@ def number(name: str, value: Any) -> str:
     return repr(found)
 
 
+UNITS = {"ns": 1e9, "us": 1e6, "ms": 1e3, "s": 1.0, "min": 1 / 60, "h": 1 / 3600, "d": 1 / 86400}
+"""Units of durations: how many are a second."""
+
+
 def seconds(name: str, value: Any) -> float:
-    """A duration: seconds, or a timedelta."""
+    """A duration: seconds, a timedelta, or a text with a unit."""
     if isinstance(value, (datetime.timedelta, np.timedelta64)):
         # NumPy's keeps the nanoseconds of pandas.
         lasts = value.to_timedelta64() if hasattr(value, "to_timedelta64") else np.timedelta64(value)
@@ -239,7 +244,13 @@ def seconds(name: str, value: Any) -> float:
         except TypeError:
             raise TypeError(f"{name}: {value!r} has no fixed length; give seconds or a timedelta of days or less") from None
     if isinstance(value, str):
-        raise TypeError(f"{name}: expected seconds or a timedelta, found {value!r}")
+        found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?\d+)?)\s*(ns|us|ms|s|min|h|d)\s*", value)
+        try:
+            value = float(found.group(1)) / UNITS[found.group(2)] if found else None
+        except ValueError:
+            value = None
+        if value is None:
+            raise ValueError(f"{name}: it is no duration; give seconds, a timedelta, or a text such as '10 ms' (ns, us, ms, s, min, h, d)")
     return float(number(name, value))
 
 

@@ -21,8 +21,8 @@ Rows = Union[str, slice, range, Sequence[Union[str, slice, range]]]
 Bound = Union[float, tuple[Optional[float], Optional[float]]]
 """A value, or the lower and the upper end of a range, either of which may be None."""
 
-Duration = Union[float, datetime.timedelta, "np.timedelta64"]
-"""Seconds, or a timedelta of Python, NumPy or pandas."""
+Duration = Union[float, datetime.timedelta, "np.timedelta64", str]
+"""Seconds, a timedelta of Python, NumPy or pandas, or a text such as ``"10 ms"``, in ns, us, ms, s, min, h or d."""
 
 Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
 """The time between the new rows, "linear", "hold" or "auto", and "unfiltered" where no filter is wanted."""

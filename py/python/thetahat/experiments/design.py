@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Union, overload
+from typing import TYPE_CHECKING, Any, Union, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
+from thetahat.base.tables import Table, columns
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
 from thetahat.engine.option_types import DesignOptions
@@ -68,8 +69,14 @@ class TestSignal:
         return f"TestSignal({self._name}, {samples} samples, {channels} channel{'' if channels == 1 else 's'})"
 
 
-class ExperimentDesign(Document):
-    """What several signals are worth for a model: the document of ``thetahat design --for``."""
+class ExperimentDesign(Document, Table):
+    """What several signals are worth for a model: the document of ``thetahat design --for``. As a frame it has a row for each signal."""
+
+    _index = "signal"
+
+    def _columns(self) -> dict[str, Any]:
+        errors = list(self.standard_errors.values())
+        return {"signal": list(self.needed), **columns(errors), "needed": list(self.needed.values())}
 
     @property
     def warnings(self) -> list[str]:
@@ -161,8 +168,7 @@ def design(
         if want is not None:
             raise ValueError("want: it needs a model; give one, or leave it out")
         return TestSignal(str(names[0]), _options.plan({"signal": signals, **options}))
-    if not isinstance(model, Model):
-        raise TypeError(f"model: expected a Model, found {type(model).__name__}")
+    model = Model._read("model", model)
     wanted = ",".join(_want(figure, error) for figure, error in (want or {}).items()) or None
     return ExperimentDesign(*_thetahat.compare_signals(model._model, _options.plan({"signal": signals, "want": wanted, **options})))
 

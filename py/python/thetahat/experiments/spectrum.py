@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
+from thetahat.base.tables import Table
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
 from thetahat.engine.option_types import SpectrumOptions
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class MeasuredResponse(Document):
+class MeasuredResponse(Document, Table):
     """The frequency response estimated from a log: the document of ``thetahat spectrum``.
+
+    As a frame it has a row for each input and frequency.
 
     Examples
     --------
@@ -145,6 +148,20 @@ class MeasuredResponse(Document):
         amplitude = np.sqrt(self.noise * np.pi / self.sample_time)
         sources.append((None, [self.frequencies, amplitude, nothing, amplitude, nothing, nothing, nothing]))
         return FrequencyResponse(sources)
+
+    def _columns(self) -> dict[str, Any]:
+        count, inputs = len(self.frequencies), len(self.inputs)
+        found: dict[str, Any] = {
+            "input": [name for name in self.inputs for _ in range(count)],
+            "frequency": np.tile(self.frequencies, inputs),
+        }
+        for name, values, ends in (
+            ("magnitude", self.magnitude, self.magnitude_intervals),
+            ("phase", self.phase, self.phase_intervals),
+        ):
+            lower, upper = np.moveaxis(ends, -1, 0)
+            found |= {name: values.ravel(), f"{name}_lower": lower.ravel(), f"{name}_upper": upper.ravel()}
+        return found | {"coherence": np.tile(self.coherence, inputs), "noise": np.tile(self.noise, inputs)}
 
     def _points(self, of: Any) -> Array:
         frequencies = [point["frequency"] for point in self.document["noise"]]

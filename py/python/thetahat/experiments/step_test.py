@@ -6,6 +6,7 @@ from typing import Any
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
+from thetahat.base.tables import Table, columns
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
 from thetahat.engine.values import Rows
@@ -13,8 +14,8 @@ from thetahat.experiments.spectrum import Array, MeasuredResponse
 from thetahat.logs.log import Log, handle
 
 
-class StepTest(Document):
-    """What the steps of a log show: the document of ``thetahat step``.
+class StepTest(Document, Table):
+    """What the steps of a log show: the document of ``thetahat step``. As a frame it has a row for each figure and method.
 
     Figures are ``"gain"``, ``"dead-time"``, ``"time-constant"``, ``"rise-time"``, ``"settling-time"``, ``"overshoot"``, ``"peak-time"``,
     ``"period"``, ``"damping"`` and ``"natural-frequency"``. Methods are ``"regime"``, ``"noise-band"``, ``"tangent"``, ``"level"``,
@@ -98,6 +99,14 @@ class StepTest(Document):
         if not named:
             raise ValueError(f"method: {figure} has no '{method}'; there are: {', '.join(of['method'] for of in own)}")
         return dict(named[0])
+
+    def _columns(self) -> dict[str, list[Any]]:
+        def row(of: dict[str, Any]) -> dict[str, Any]:
+            value = of["value"]
+            own = {"figure": of["figure"], "method": of["method"], "value": value["value"]}
+            return {**own, "standard_error": value["standard_error"], "trusted": of["trusted"]}
+
+        return columns([row(of) for of in self.document["summary"]])
 
     def __repr__(self) -> str:
         count = len(self.document["steps"])

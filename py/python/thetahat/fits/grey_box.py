@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -11,6 +12,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
 from thetahat.engine import files as _files, options as _options
@@ -265,6 +267,37 @@ class GreyBox:
         made = object.__new__(type(self))
         made._model = self._model.with_parameters([(name, _number(name, value)) for name, value in values.items()])
         return made
+
+    def simulate(self, u: ArrayLike | None = None, steps: int | None = None) -> NDArray[np.float64]:
+        """The free run from the initial state, without noise, unknown parameters at their starts: the outputs that inputs drive, or so many steps without inputs.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,) or (N, inputs), optional
+            The inputs, one sample time apart.
+        steps : int, optional
+            How many, of a model without inputs.
+
+        Returns
+        -------
+        ndarray, shape (N,), or (N, outputs) where there are several
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> box = th.GreyBox({
+        ...     "sample_time": 1,
+        ...     "states": {"level": {"start": 0, "sd": 1}},
+        ...     "inputs": {"flow": "u"},
+        ...     "next": {"level": "0.9 * level + flow"},
+        ...     "outputs": {"y": "level"},
+        ...     "noise": {"measurement": {"y": 1}},
+        ... })
+        >>> box.simulate([1.0, 1.0, 1.0])
+        array([0. , 1. , 1.9])
+        """
+        run: NDArray[np.float64] = importlib.import_module("thetahat.online.filter").StateFilter(self).predict(u, steps)
+        return run
 
     def to_toml(self) -> str:
         """The text as it was written."""

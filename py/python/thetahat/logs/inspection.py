@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from thetahat import _thetahat
+from thetahat.base.tables import Table, columns
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
 from thetahat.engine.options import ReadOptions
@@ -55,8 +56,8 @@ class Finding:
         return self.seen if self.advice is None else f"{self.seen}: {self.advice}"
 
 
-class Inspection(Document):
-    """The checks of a log before a fit: the document of ``thetahat inspect``.
+class Inspection(Document, Table):
+    """The checks of a log before a fit: the document of ``thetahat inspect``. As a frame it has a row for each channel.
 
     Examples
     --------
@@ -111,6 +112,24 @@ class Inspection(Document):
     def command(self) -> str | None:
         """The line of ``thetahat fit`` that goes with the file, if it was one."""
         return self.document.get("command")
+
+    _index = "channel"
+
+    def _columns(self) -> dict[str, list[Any]]:
+        figures = ("missing", "minimum", "maximum", "mean", "standard_deviation", "outlier_count")
+
+        def row(channel: dict[str, Any]) -> dict[str, Any]:
+            name = channel["name"]
+            own = {"channel": name, "role": channel["role"], **{figure: channel[figure] for figure in figures}}
+            of_input: dict[str, dict[str, Any]] = {
+                "delay": self.delays,
+                "confidence": self.confidence,
+                "feedback": self.feedback,
+                "excitation": self.excitation,
+            }
+            return {**own, **{figure: of.get(name) for figure, of in of_input.items()}}
+
+        return columns([row(channel) for channel in self.document["channels"]])
 
     def __repr__(self) -> str:
         count = len(self.warnings)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping, Sequence
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,8 @@ class Log:
     """Inputs and outputs on a common clock.
 
     A log owns its data: arrays are copied once, here. NaN is a missing sample; it ends a segment, and nothing reaches
-    across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel.
+    across. Rows are counted as Python does: ``log[:500]`` is the log of the first 500, and ``log["u"]`` is a channel. A log with dates
+    is cut by these too: ``log["2026-03-01":"2026-03-02"]`` are two days.
 
     Parameters
     ----------
@@ -285,6 +287,48 @@ class Log:
             clock = np.arange(len(self), dtype=np.float64) * self.sample_time
         return clock
 
+    def resample(self, step: Duration, how: Literal["auto", "linear", "hold"] = "auto", *, unfiltered: bool = False) -> Log:
+        """The same signals on another clock.
+
+        Parameters
+        ----------
+        step : float, timedelta or str
+            Time from one new row to the next: seconds, a timedelta, or a text such as ``"10 s"``.
+        how : {"auto", "linear", "hold"}, default "auto"
+            How to read between the old rows: "auto" holds channels that move in steps.
+        unfiltered : bool, default False
+            Whether to leave out the filter against aliasing, which there is where the step is two old ones or more.
+
+        Returns
+        -------
+        Log
+            Each experiment for itself.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.dc_motor().resample("50 ms")
+        Log(200 rows, inputs u, output y, sample time 0.05 s resampled)
+        """
+        resample = (step, how, "unfiltered") if unfiltered else (step, how)
+        return Log.join([self[rows]._resampled(resample) for rows in self.experiments])
+
+    def _resampled(self, resample: Resample) -> Log:
+        clock = self._clock
+        if clock.times is None or len(clock.times.values) != len(self):
+            clock = Clock("by time", _clock.Labels(self.time, "time"))
+        channels = [(name, self._log.values(name)) for name in [*self.inputs, *self.outputs]]
+        return self._of(*_made(channels, (self.inputs, self.outputs), clock, None, None, resample, "time", uniform=False))
+
+    def plot(self, **options: Any) -> Any:
+        """Draw the signals over time: `thetahat.plot.log`.
+
+        Returns
+        -------
+        ndarray of Axes
+        """
+        return importlib.import_module("thetahat.plot").log(self, **options)
+
     def to_pandas(self, **columns: npt.ArrayLike) -> Any:
         """A data frame of pandas with the index that the log came with, beside its channels what belongs to its rows.
 
@@ -415,11 +459,16 @@ class Log:
             rows = slice(rows.start, rows.stop, rows.step)
         if not isinstance(rows, slice):
             raise TypeError(f"a log is cut by a slice such as log[:500], found {rows!r}")
+        dated = [end for end in (rows.start, rows.stop) if end is not None and not hasattr(end, "__index__")]
+        if dated:
+            if rows.step is not None or self._clock.times is None:
+                raise TypeError(f"rows: {dated[0]!r} is no row; cut by rows such as log[:500], or a log with dates by these")
+            rows = self._clock.times.between(rows.start, rows.stop)
         start, stop, step = rows.indices(len(self))
         if step != 1:
             raise ValueError(f"rows: a step of {step} leaves some out; give one of 1")
         if stop <= start:
-            raise ValueError(f"rows: {start}:{stop} is empty; the log has {len(self)}")
+            raise ValueError(f"rows: {' to '.join(map(str, dated)) or f'{start}:{stop}'} is empty; the log has {len(self)}")
         return self._of(self._log.part(start + 1, stop), self._clock.part(start, stop))
 
     def __eq__(self, other: object) -> bool:

@@ -323,6 +323,15 @@ class KnownModels:
         return cls.from_control(system, delay=delay, noise_variance=noise_variance)
 
     @classmethod
+    def _read(cls, argument: str, value: Any) -> Self:
+        """A model as it is, a linear system of python-control or SciPy as a model."""
+        if isinstance(value, cls):
+            return value
+        if any(hasattr(value, name) for name in ("num", "A", "to_tf")):
+            return cls.from_scipy(value)
+        raise TypeError(f"{argument}: expected a Model, found {type(value).__name__}")
+
+    @classmethod
     def _known(cls, **options: Any) -> Self:
         given = {name: value for name, value in options.items() if value is not None}
         return cls._of(_thetahat.Model.known(json.dumps(given)))

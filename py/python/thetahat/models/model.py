@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from thetahat import _thetahat
-from thetahat.base import numbers as _numbers, picture as _picture, said as _said
+from thetahat.base import frames as _frames, numbers as _numbers, picture as _picture, said as _said
+from thetahat.base.frames import Frame
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import ValidationOptions
@@ -90,13 +91,14 @@ class Model(ConvertibleModel, KnownModels):
         """
         _thetahat.write(_files.name(path), self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
 
-    def predict(self, log: Log, horizon: int | None = 1, *, initial: str = "auto") -> Array:
+    def predict(self, log: Log | Frame, horizon: int | None = 1, *, initial: str = "auto") -> Array:
         """The prediction of each row from what was known some steps before, in the units of the log.
 
         Parameters
         ----------
-        log : Log
-            The data; its channels are found by name.
+        log : Log or data frame
+            The data; its channels are found by name. Rows of a frame without a clock are a sample time of the model apart; for a free
+            run it needs no output.
         horizon : int or None, default 1
             Steps ahead. None is a free run: the inputs alone drive the model.
         initial : {"auto", "drop", "zero", "estimate"}, default "auto"
@@ -126,8 +128,8 @@ class Model(ConvertibleModel, KnownModels):
         return self._predicted(log, horizon, initial)[0]
 
     def predict_interval(
-        self, log: Log, horizon: int | None = 1, *, level: float = 0.95, initial: str = "auto"
-    ) -> tuple[Array, Array]:
+        self, log: Log | Frame, horizon: int | None = 1, *, level: float = 0.95, initial: str = "auto"
+    ) -> Array:
         """Intervals that hold the output, as far as one knows some steps before.
 
         They count what the noise does and how uncertain the parameters are, on a log that the model was not fitted to.
@@ -141,18 +143,21 @@ class Model(ConvertibleModel, KnownModels):
 
         Returns
         -------
-        lower, upper : ndarray, shape (N,), or (N, outputs) where there are several
-            NaN where there is none.
+        ndarray, shape (N, 2), or (N, outputs, 2) where there are several
+            The lower and the upper end; NaN where there is none.
         """
         quantile = _options.quantile(level)
         values, deviations = self._predicted(log, horizon, initial)
         half = quantile * (np.nan if deviations is None else deviations)
-        return values - half, values + half
+        return np.stack([values - half, values + half], axis=-1)
 
-    def _predicted(self, log: Log, horizon: int | None, initial: str) -> tuple[Array, Array | None]:
+    def _predicted(self, log: Log | Frame, horizon: int | None, initial: str) -> tuple[Array, Array | None]:
         if horizon is not None:
             horizon = _options.count("horizon", horizon, 1_000_000)
-        found = self._model.predict(handle("log", log), horizon, initial)
+        data = self._log_of(log, horizon is None)
+        if horizon is None and initial == "auto" and all(np.isnan(data[output]).all() for output in self.outputs):
+            initial = "zero"
+        found = self._model.predict(data._log, horizon, initial)
         deviations = [deviations for _, deviations in found if deviations is not None]
         return _beside([values for values, _ in found]), _beside(deviations) if deviations else None
 
@@ -264,7 +269,7 @@ class Model(ConvertibleModel, KnownModels):
         return runs
 
     def forecast(
-        self, log: Log, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
+        self, log: Log | Frame, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
     ) -> Forecast:
         """What comes after the end of a log.
 
@@ -273,7 +278,7 @@ class Model(ConvertibleModel, KnownModels):
 
         Parameters
         ----------
-        log : Log
+        log : Log or data frame
             What is known.
         steps : int
             The horizon.
@@ -301,12 +306,13 @@ class Model(ConvertibleModel, KnownModels):
         """
         steps = _options.count("steps", steps, 1_000_000)
         future = None if u is None else self._inputs_of(u)
-        found = self._model.forecast(handle("log", log), steps, future, initial)
+        log = self._log_of(log)
+        found = self._model.forecast(log._log, steps, future, initial)
         values, deviations = (_beside(columns) for columns in zip(*found))
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
-        return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time))
+        return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time), self.outputs)
 
-    def residuals(self, log: Log, horizon: int = 1, *, initial: str = "auto") -> Array:
+    def residuals(self, log: Log | Frame, horizon: int = 1, *, initial: str = "auto") -> Array:
         """The measured output less its prediction.
 
         Parameters
@@ -327,13 +333,14 @@ class Model(ConvertibleModel, KnownModels):
         >>> bool(np.isclose(np.nanmean(model.residuals(th.dc_motor()) ** 2), model.mse))
         True
         """
+        log = self._log_of(log)
         values = self.predict(log, horizon, initial=initial)
         return _beside([log[output] for output in self.outputs]) - values
 
     @_options.takes(ValidationOptions)
     def validate(
         self,
-        log: Log,
+        log: Log | Frame,
         require: str | Sequence[str] | None = None,
         **options: Unpack[ValidationOptions],
     ) -> Validation:
@@ -341,7 +348,7 @@ class Model(ConvertibleModel, KnownModels):
 
         Parameters
         ----------
-        log : Log
+        log : Log or data frame
             The data, best those that the model was not fitted to.
         require : str or sequence of str, optional
             What the model must be or do: ``white``, ``independent``, ``stable``, ``fit>=80``, ``fit@5>=80``,
@@ -367,10 +374,11 @@ class Model(ConvertibleModel, KnownModels):
         >>> model.validate(log[700:], require=["white", "independent", "fit>=90"]).unmet
         []
         """
-        plan = _options.plan(options, len(log) if isinstance(log, Log) else None)
+        data = self._log_of(log)
+        plan = _options.plan(options, len(data))
         listed = [require] if isinstance(require, str) else require or ()
         required = [one for text in listed for one in _options.text("require", text).split(",")]
-        return Validation._of(_thetahat.validate(self._model, handle("log", log), plan, required))
+        return Validation._of(_thetahat.validate(self._model, data._log, plan, required))
 
     def frequency_response(
         self, w: npt.ArrayLike | None = None, *, points: int = 100, output: int | str | None = None
@@ -458,6 +466,27 @@ class Model(ConvertibleModel, KnownModels):
         True
         """
         return TransientResponse(*self._model.impulse_response(*self._source(input, samples), self._output(output)))
+
+    def _log_of(self, data: Log | Frame, inputs_alone: bool = False) -> Log:
+        """A log, or that of the channels of a frame that the model has."""
+        if isinstance(data, Log) or not hasattr(data, "columns"):
+            handle("log", data)
+            return data
+        frame = _frames.plain(data)
+        there = _frames.names(frame)
+        for name in [*self.inputs, *self.outputs]:
+            if name not in there and not (inputs_alone and name in self.outputs):
+                raise ValueError(f"log: there is no column {name!r}, which is a channel of the model; there are {', '.join(map(repr, there))}")
+        missing = [name for name in self.outputs if name not in there]
+        if missing:
+            frame = _frames.with_missing(frame, missing)
+        with _said.kept() as words:
+            log = Log.from_dataframe(frame, inputs=self.inputs, output=self.outputs)
+        if log._clock.times is None:
+            return Log.from_dataframe(frame, inputs=self.inputs, output=self.outputs, sample_time=self.sample_time)
+        for word in words:
+            _said.warn(word)
+        return log
 
     def _source(self, input: int | str, samples: int | None) -> tuple[int, int | None]:
         return self._input(input), None if samples is None else _options.count("samples", samples)

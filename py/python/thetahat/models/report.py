@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import erfc, sqrt
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ import numpy.typing as npt
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
+from thetahat.base.clock import imported
+from thetahat.base.tables import Records, Table
 from thetahat.engine import options as _options
 
 Array = npt.NDArray[np.float64]
@@ -58,8 +61,22 @@ class Decision:
         return f"{self.because}: {self.did} ({self.instead} says otherwise)"
 
 
-class ReportedModel:
-    """What the report of a fit says."""
+class ReportedModel(Table):
+    """What the report of a fit says. As a frame it has a row for each parameter."""
+
+    _index = "parameter"
+
+    def _columns(self) -> dict[str, Any]:
+        lower, upper = self.confidence_interval().T
+        return {
+            "parameter": self.parameter_names,
+            "value": self.parameters,
+            "standard_error": self.standard_errors,
+            "t": self._t,
+            "p": self._p,
+            "lower": lower,
+            "upper": upper,
+        }
 
     _model: _thetahat.Model
 
@@ -192,6 +209,55 @@ class ReportedModel:
         """
         half = _options.quantile(level) * self.standard_errors
         return np.column_stack([self.parameters - half, self.parameters + half])
+
+    def conf_int(self, level: float = 0.95) -> Any:
+        """`confidence_interval` as a frame of pandas, columns ``lower`` and ``upper``, by the names of the parameters."""
+        ends = dict(zip(("lower", "upper"), self.confidence_interval(level).T))
+        return imported("pandas").DataFrame(ends, self.parameter_names)
+
+    @property
+    def params(self) -> Any:
+        """The `parameters` as a series of pandas, by their names.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.arx(th.dc_motor(), na=2, nb=2)
+        >>> print(model.params.round(2).to_dict())
+        {'a1': -1.55, 'a2': 0.58, 'b1': 0.36, 'b2': 0.31}
+        >>> print(model.tvalues.idxmin(), model.pvalues.max() < 1e-9)
+        a1 True
+        """
+        return self._series(self.parameters)
+
+    @property
+    def std_errors(self) -> Any:
+        """The `standard_errors` as a series of pandas; statsmodels calls them ``bse``."""
+        return self._series(self.standard_errors)
+
+    bse = std_errors
+
+    @property
+    def tvalues(self) -> Any:
+        """Each parameter over its standard error, as a series of pandas."""
+        return self._series(self._t)
+
+    @property
+    def pvalues(self) -> Any:
+        """How likely a t as far from 0 is where the parameter is 0, by the normal distribution, as a series of pandas."""
+        return self._series(self._p)
+
+    def _series(self, values: Array) -> Any:
+        return imported("pandas").Series(values, self.parameter_names)
+
+    @property
+    def _t(self) -> Array:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.parameters / self.standard_errors
+
+    @property
+    def _p(self) -> Array:
+        return np.array([erfc(abs(t) / sqrt(2.0)) for t in self._t])
 
     @property
     def a(self) -> Array:
@@ -525,9 +591,20 @@ class ReportedModel:
         return [of(made) for made in self.document.get("decisions", [])]
 
     @property
-    def selection(self) -> dict[str, Any] | None:
-        """How the model was chosen among others, if it was."""
-        return self.document.get("selection")
+    def selection(self) -> Records | None:
+        """How the model was chosen among others, if it was: a dict, and as a frame the best of those that were compared.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> chosen = th.arx(th.dc_motor(), na=range(1, 4), nb=range(1, 4))
+        >>> chosen.selection.to_pandas()[["na", "nb", "parameters", "score"]].head(2).round(3)
+           na  nb  parameters  score
+        0   3   3           6 -1.191
+        1   3   2           5 -1.089
+        """
+        found = self.document.get("selection")
+        return None if found is None else Records(found, "best")
 
     @property
     def warnings(self) -> list[str]:

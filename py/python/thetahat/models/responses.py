@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from thetahat.base import clock as _clock
 from thetahat.base.clock import Clock
+from thetahat.base.tables import Table
 from thetahat.engine import options as _options
 from thetahat.models import convert as _convert
 
@@ -28,18 +29,24 @@ class Forecast:
     standard_deviations : ndarray, shape (steps,)
         Those of their errors: what the noise does, and what the uncertainty of the parameters, of the output's offset
         and of the initial states adds.
+    outputs : list of str
+        The names of the outputs. Of several, arrays have an axis for them, and the columns of frames begin with their names.
     """
 
-    def __init__(self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None) -> None:
+    def __init__(
+        self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None, outputs: Sequence[str] = ("y",)
+    ) -> None:
         self.time = time
         self.values = values
         self.standard_deviations = standard_deviations
+        self.outputs = list(outputs)
         self._clock = Clock() if clock is None else clock
 
-    def interval(self, level: float = 0.95) -> tuple[Array, Array]:
-        """The lower and the upper ends of intervals that hold the output with this probability."""
+    def interval(self, level: float = 0.95) -> Array:
+        """The lower and the upper ends of intervals that hold the output with this probability, shape (steps, 2), of several outputs
+        (steps, outputs, 2)."""
         half = _options.quantile(level) * self.standard_deviations
-        return self.values - half, self.values + half
+        return np.stack([self.values - half, self.values + half], axis=-1)
 
     def to_pandas(self, level: float = 0.95) -> Any:
         """A data frame of pandas, whose index goes on from that of the log, or is the time in seconds.
@@ -75,15 +82,20 @@ class Forecast:
         return _clock.to_polars(self._clock, self.time, self._columns(level))
 
     def _columns(self, level: float) -> dict[str, Array]:
-        lower, upper = self.interval(level)
-        return {"value": self.values, "standard_deviation": self.standard_deviations, "lower": lower, "upper": upper}
+        figures = {"value": self.values, "standard_deviation": self.standard_deviations}
+        figures |= dict(zip(("lower", "upper"), np.moveaxis(self.interval(level), -1, 0)))
+        if self.values.ndim == 1:
+            return figures
+        return {f"{output}_{name}": column[:, place] for place, output in enumerate(self.outputs) for name, column in figures.items()}
 
     def __repr__(self) -> str:
         return f"Forecast({len(self.values)} steps from {self.time[0]:g} s)"
 
 
-class FrequencyResponse:
+class FrequencyResponse(Table):
     """The response of an output to its sources at some frequencies.
+
+    As a frame it has a row for each source and frequency.
 
     Attributes
     ----------
@@ -109,12 +121,23 @@ class FrequencyResponse:
         self.phase: Array = columns[:, 5]
         self.phase_errors: Array = columns[:, 6]
 
+    def _columns(self) -> dict[str, Any]:
+        count = len(self.frequencies)
+        return {
+            "source": [source for source in self.sources for _ in range(count)],
+            "frequency": np.tile(self.frequencies, len(self.sources)),
+            "magnitude": self.magnitude.ravel(),
+            "magnitude_error": self.magnitude_errors.ravel(),
+            "phase": self.phase.ravel(),
+            "phase_error": self.phase_errors.ravel(),
+        }
+
     def __repr__(self) -> str:
         return f"FrequencyResponse({len(self.frequencies)} frequencies, {', '.join(self.sources)})"
 
 
-class TransientResponse:
-    """The response of an output to a unit step or impulse of an input, from rest.
+class TransientResponse(Table):
+    """The response of an output to a unit step or impulse of an input, from rest. As a frame its index is the time.
 
     Attributes
     ----------
@@ -126,10 +149,15 @@ class TransientResponse:
         NaN where no theory gives one.
     """
 
+    _index = "time"
+
     def __init__(self, time: Array, values: Array, standard_errors: Array) -> None:
         self.time = time
         self.values = values
         self.standard_errors = standard_errors
+
+    def _columns(self) -> dict[str, Any]:
+        return {"time": self.time, "value": self.values, "standard_error": self.standard_errors}
 
     def __repr__(self) -> str:
         return f"TransientResponse({len(self.time)} samples, {self.values[-1]:g} at the end)"

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from thetahat import _thetahat
+from thetahat.base.tables import Table, columns
 from thetahat.engine.document import Document
 
 
-class Validation(Document):
+class Validation(Document, Table):
     """How a model does on a log: the document of ``thetahat validate``.
+
+    As a frame it has a row for each output and horizon, of which inf is a free run.
 
     Attributes
     ----------
@@ -30,6 +35,11 @@ class Validation(Document):
     94.88
     >>> validation.whiteness < 0.05
     True
+    >>> validation.to_pandas()[["horizon", "fit"]].round(2)
+       horizon    fit
+    0      1.0  98.12
+    1      5.0  95.86
+    2      inf  94.88
     """
 
     @classmethod
@@ -118,12 +128,30 @@ class Validation(Document):
                 found[one["input"]] = known if value is None or value > known else value
         return found
 
+    def _columns(self) -> dict[str, list[Any]]:
+        return columns(list(fit_rows(self.document)))
+
     def __repr__(self) -> str:
         rows = sum(last - first + 1 for first, last in self.document["rows"])
         fits = {fit["horizon"].get("steps"): fit["percent"] for fit in self.document["fit"]}
         shown = {1: "1-step fit", None: "free run"}
         texts = [f"{name} {fits[steps]:.2f} %" for steps, name in shown.items() if fits.get(steps) is not None]
         return f"Validation({', '.join([*texts, f'{rows} rows'])})"
+
+
+def fit_rows(document: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The figures of each output and horizon of a validation."""
+    for fit in document["fit"]:
+        steps = fit["horizon"].get("steps")
+        yield {
+            "output": fit["output"],
+            "horizon": np.inf if steps is None else float(steps),
+            "samples": fit["samples"],
+            "fit": fit["percent"],
+            "rmse": fit["rmse"],
+            "mean_absolute_error": fit["mean_absolute_error"],
+            "largest_error": fit["largest_error"],
+        }
 
 
 def _p_value(independence: Mapping[str, Any]) -> float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import re
 from collections.abc import Sequence
@@ -184,6 +185,30 @@ class StateModel:
     def sample_time(self) -> float:
         """Seconds of a sample."""
         return self._model.sample_time
+
+    def simulate(self, u: npt.ArrayLike | None = None, steps: int | None = None) -> npt.NDArray[np.float64]:
+        """The free run from the initial state, without noise: the outputs that inputs drive, or so many steps without inputs.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,) or (N, inputs), optional
+            The inputs, one sample time apart.
+        steps : int, optional
+            How many, of a model without inputs.
+
+        Returns
+        -------
+        ndarray, shape (N,), or (N, outputs) where there are several
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.StateModel([[0.9]], [[1.0]], [[1.0]], [[1.0]], [[1.0]], G=[[1.0]], sample_time=0.1)
+        >>> model.simulate([1.0, 1.0, 1.0])
+        array([0. , 1. , 1.9])
+        """
+        run: Array = importlib.import_module("thetahat.online.filter").StateFilter(self).predict(u, steps)
+        return run
 
     def __eq__(self, other: object) -> bool:
         return self._text == other._text if isinstance(other, StateModel) else NotImplemented

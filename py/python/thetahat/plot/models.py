@@ -102,7 +102,7 @@ def fit(
         label = _drawing.shown(f"{name}, {far}" + (f": {_drawing.fixed(percent, 2)} %" if isfinite(percent) else ""))
         (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_drawing.lone(drawn))
         if horizon is not None:
-            ends = model.predict_interval(log, horizon, level=level)
+            ends = np.moveaxis(model.predict_interval(log, horizon, level=level), -1, 0)
             low, high = (_drawing.broken(log, _column(end, place))[1] for end in ends)
             bands.append(_drawing.band(ax, time, low, high, line.get_color()))
     _drawing.label_one(bands, level)

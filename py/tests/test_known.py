@@ -126,9 +126,9 @@ def test_systems_of_other_packages_are_models_where_models_are_asked_for() -> No
     known = control.tf([0.36, 0.32], [1, -1.54, 0.58], dt=0.01)
     log = th.dc_motor()
     assert repr(th.compare({"known": known, "arx": th.arx(log, 2, 2)}, log)) == "Comparison(known, arx)"
-    gains = th.lqr(known, 1.0)
-    assert th.lqr(th.Model.from_control(known), 1.0).to_json() == gains.to_json()
-    controller = th.RstController([0.1], [1.0], [0.1])
+    gains = th.lqr(known, 1.0, integrator=True)
+    assert th.lqr(th.Model.from_control(known), 1.0, integrator=True).to_json() == gains.to_json()
+    controller = gains.controller()
     assert th.closed_loop(controller, known, np.ones(50), noise=False).y.shape == (50,)
     for call in (lambda: th.lqr("arx", 1.0), lambda: th.compare({"a": 1}, log), lambda: th.closed_loop(controller, 3, np.ones(5))):  # type: ignore[dict-item, arg-type]
         with pytest.raises(TypeError, match="expected a Model"):

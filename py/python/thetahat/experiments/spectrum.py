@@ -144,7 +144,7 @@ class MeasuredResponse(Document):
         nothing = np.full(len(self.frequencies), np.nan)
         amplitude = np.sqrt(self.noise * np.pi / self.sample_time)
         sources.append((None, [self.frequencies, amplitude, nothing, amplitude, nothing, nothing, nothing]))
-        return FrequencyResponse(sources)
+        return FrequencyResponse(sources, self.output)
 
     def _points(self, of: Any) -> Array:
         frequencies = [point["frequency"] for point in self.document["noise"]]

@@ -304,7 +304,7 @@ class Model(ConvertibleModel, KnownModels):
         found = self._model.forecast(handle("log", log), steps, future, initial)
         values, deviations = (_beside(columns) for columns in zip(*found))
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
-        return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time))
+        return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time), self.outputs)
 
     def residuals(self, log: Log, horizon: int = 1, *, initial: str = "auto") -> Array:
         """The measured output less its prediction.
@@ -399,7 +399,13 @@ class Model(ConvertibleModel, KnownModels):
         array([19. , 18.9, 13.4])
         """
         points = _options.count("points", points)
-        return FrequencyResponse(self._model.frequency_response(w, points, self._output(output)))
+        place = self._output(output)
+        found = self._model.frequency_response(w, points, place)
+        if not found:
+            raise ValueError(
+                "model: it has no inputs, and with several outputs no response to the noise: there is no frequency response"
+            )
+        return FrequencyResponse(found, self.outputs[place])
 
     def step_response(
         self, input: int | str = 0, samples: int | None = None, *, output: int | str | None = None

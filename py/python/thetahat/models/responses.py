@@ -28,12 +28,22 @@ class Forecast:
     standard_deviations : ndarray, shape (steps,)
         Those of their errors: what the noise does, and what the uncertainty of the parameters, of the output's offset
         and of the initial states adds.
+    outputs : list of str
+        The names of the outputs.
     """
 
-    def __init__(self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        time: Array,
+        values: Array,
+        standard_deviations: Array,
+        clock: Clock | None = None,
+        outputs: Sequence[str] = ("y",),
+    ) -> None:
         self.time = time
         self.values = values
         self.standard_deviations = standard_deviations
+        self.outputs = list(outputs)
         self._clock = Clock() if clock is None else clock
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
@@ -97,9 +107,12 @@ class FrequencyResponse:
         The phase is in radians and does not jump.
     magnitude_errors, phase_errors : ndarray, shape (sources, K)
         Standard errors; NaN where no theory gives one.
+    output : str or None
+        The name of the output, where it is known.
     """
 
-    def __init__(self, sources: Sequence[tuple[str | None, Sequence[Array]]]) -> None:
+    def __init__(self, sources: Sequence[tuple[str | None, Sequence[Array]]], output: str | None = None) -> None:
+        self.output = output
         self.sources = ["noise" if name is None else name for name, _ in sources]
         columns = np.array([list(columns) for _, columns in sources])
         self.frequencies: Array = columns[0, 0]

@@ -89,6 +89,20 @@ def test_dates_of_the_log_stand_on_the_axis_in_its_time_zone() -> None:
     assert alone[1] - alone[0] == 1
 
 
+def test_dates_of_polars_and_of_texts_are_dates() -> None:
+    instants = pd.date_range("2026-03-01", periods=50, freq="min").to_pydatetime()
+    texts = [f"{instant.isoformat()}+02:00" for instant in instants]
+    for times, label in ((instants, "time"), (texts, "time (UTC+02:00)"), (1_770_000_000 + 60 * np.arange(50), "time (UTC)")):
+        (ax,) = plot.log(th.Log(np.arange(50.0), time=times))
+        assert is_dated(ax) and ax.get_xlabel() == label
+    polars = pytest.importorskip("polars")
+    column = polars.Series("time", list(instants)).dt.replace_time_zone("America/New_York")
+    (ax,) = plot.log(th.Log.from_dataframe(polars.DataFrame({"time": column, "y": np.arange(50.0)}), output="y"))
+    assert is_dated(ax) and ax.get_xlabel() == "time (America/New_York)"
+    # Durations are seconds.
+    assert not is_dated(plot.log(th.Log(np.arange(50.0), time=pd.timedelta_range(0, periods=50, freq="s")))[0])
+
+
 def test_every_axis_of_time_has_the_dates() -> None:
     log = dated()
     model = th.arx(log, na=2, nb=2)

@@ -5,7 +5,8 @@ saves a figure: ``ax.figure.savefig("fit.png")`` does, or ``matplotlib.pyplot.sh
 intervals that hold the truth with the probability ``level``; there is no band where no theory gives one.
 
 Logs and models of several outputs are drawn with axes for each, unless ``output`` names one. Where the clock of a log
-has dates, the axes of time have them too, in its time zone. Legends stand above the axes, where they cover nothing.
+has dates, the axes of time have them too, in its time zone. Legends stand above the axes, where they cover nothing;
+a figure of your own makes place for them with ``matplotlib.pyplot.subplots(layout="constrained")``.
 
 >>> import thetahat as th
 >>> from thetahat import plot

@@ -296,7 +296,7 @@ def test_residuals_are_those_of_the_validation(two_inputs: th.Log) -> None:
         np.testing.assert_array_equal(line.get_ydata(), test["correlation"])
         assert max(edges(bands(ax)[0])[2]) == pytest.approx(max(test["band"]), rel=1e-12)
         assert f"residuals and {test['input']}" in ax.get_title()
-        assert legend(ax) == ["95 % band"]
+    assert legend(axes[0]) == ["95 % band"] and all(ax.get_legend() is None for ax in axes[1:])
     assert f"p = {validation.whiteness:.2g}" in axes[0].get_title()
     assert all(is_inked(ax) for ax in axes)
     # The same of a model and a log.
@@ -398,7 +398,9 @@ def test_step_of_an_input_by_name(two_inputs: th.Log) -> None:
     assert ax.get_ylabel() == "room per unit of fan"
     with pytest.raises(ValueError, match="room has no input pump; there are: heater, fan"):
         plot.step({"room": model}, "pump")
-    with pytest.raises(ValueError, match="there is no input 0"):
+    with pytest.raises(ValueError, match="there is no input 5"):
+        plot.step(model, 5)
+    with pytest.raises(ValueError, match=r"AR\(1\) has no inputs to make a step of"):
         plot.step(th.ar(two_inputs, na=1))
     assert is_inked(plot.step(model, 1, samples=1))
 
@@ -444,7 +446,7 @@ def test_poles_without_covariance_and_of_an_integrator(plain: th.Model, two_inpu
     assert not [patch for patch in ax.patches if type(patch) is Ellipse]
     integrator = quietly(th.arx, two_inputs, na=1, nb=[1, 2], bound={"a1": -1.0})
     assert is_inked(plot.poles_zeros(integrator))
-    ax = plot.step(integrator)
+    ax = plot.step(integrator, 0)
     np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), integrator.step_response().values)
     assert is_inked(plot.bode(integrator)[0, 0])
 
@@ -551,7 +553,7 @@ def test_mistakes_are_told(log: th.Log, model: th.Model) -> None:
     with pytest.raises(ValueError, match=r"axes: expected shape \(2, 2\), found \(4,\)"):
         plot.bode(model, axes=plt.subplots(4)[1], sources=["u", "noise"])
     with pytest.raises(TypeError, match="ax: expected a Axes, found Figure"):
-        plot.step(model, ax=plt.figure())  # type: ignore[arg-type]
+        plot.step(model, ax=plt.figure())
     with pytest.raises(ValueError, match="level: 95 is not between 0 and 1"):
         plot.bode(model, level=95)
     with pytest.raises(TypeError, match="give a Log too"):

@@ -80,11 +80,9 @@ def test_the_plant_is_found_and_every_method_takes_it() -> None:
     known = 1000 * (np.log(np.linalg.det(share * model.noise_covariance)) + 2 * np.log(2 * np.pi) + 2)
     assert model.log_likelihood == pytest.approx(-known / 2, rel=1e-9)
     assert "state space of order 2" in model._repr_html_()
-    for draw in (plot.step, plot.impulse, plot.bode):
-        draw(model, output="y2")
-        with pytest.raises(ValueError, match="output: there are several"):
-            draw(model)
-    assert plot.bode(model, output=0).shape == (2, 2)
+    for draw in (plot.step, plot.impulse):
+        assert draw(model).shape == (2, 2) and draw(model, output="y2").shape == (1, 2)
+    assert plot.bode(model).shape == (4, 2) and plot.bode(model, output=0).shape == (2, 2)
     plot.fit(model, data, 5, output="y1")
 
 

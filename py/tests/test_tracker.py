@@ -488,8 +488,9 @@ def test_the_parameters_of_one_of_several_outputs_are_drawn() -> None:
     line = axes[0].get_lines()[0]
     drawn = np.asarray(line.get_ydata(), dtype=float)
     np.testing.assert_array_equal(drawn[-1], trajectory.parameters[-1, 1, 0])
-    with pytest.raises(ValueError, match="output: there are several"):
-        plot.parameters(trajectory)
+    both = plot.parameters(trajectory)
+    assert both.shape == (len(axes), 2) and [ax.get_title() for ax in both[0]] == ["a", "b"]
+    np.testing.assert_array_equal(both[0, 1].get_lines()[0].get_ydata(), line.get_ydata())
     with pytest.raises(ValueError, match="'c' is none of a, b"):
         plot.parameters(trajectory, output="c")
 

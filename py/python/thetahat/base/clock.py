@@ -135,7 +135,7 @@ class Labels(NamedTuple):
         if self.values.dtype.kind == "m":
             return f"{value / SECOND:g} s"
         if self.zone is not None:
-            instant, zone = value.astype("datetime64[us]").item(), _tzinfo(self.zone)
+            instant, zone = value.astype("datetime64[us]").item(), self.tzinfo
             # Python has no dates after the year 9999.
             if zone is not None and isinstance(instant, datetime.datetime):
                 return instant.replace(tzinfo=datetime.timezone.utc).astimezone(zone).isoformat()
@@ -171,10 +171,20 @@ class Labels(NamedTuple):
         series = polars.Series(name, values)
         if self.zone is not None:
             series = series.dt.replace_time_zone("UTC")
-            known = str(getattr(self.zone, "key", getattr(self.zone, "zone", self.zone)))
+            known = self.zone_name
             if known != "UTC" and "/" in known:
                 series = series.dt.convert_time_zone(known)
         return series
+
+    @property
+    def zone_name(self) -> str:
+        """What the time zone is called; nothing where there is none."""
+        return "" if self.zone is None else str(getattr(self.zone, "key", getattr(self.zone, "zone", self.zone)))
+
+    @property
+    def tzinfo(self) -> datetime.tzinfo | None:
+        """The time zone as Python has it; None where there is none, or Python does not know it."""
+        return None if self.zone is None else _tzinfo(self.zone)
 
     @property
     def _is_counted(self) -> bool:

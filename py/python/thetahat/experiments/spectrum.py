@@ -147,7 +147,7 @@ class MeasuredResponse(Document, Table):
         nothing = np.full(len(self.frequencies), np.nan)
         amplitude = np.sqrt(self.noise * np.pi / self.sample_time)
         sources.append((None, [self.frequencies, amplitude, nothing, amplitude, nothing, nothing, nothing]))
-        return FrequencyResponse(sources)
+        return FrequencyResponse(sources, self.output)
 
     def _columns(self) -> dict[str, Any]:
         count, inputs = len(self.frequencies), len(self.inputs)

@@ -249,17 +249,22 @@ class ConvertibleModel(ReportedModel):
         return found.F, found.G, found.H, found.D, self.sample_time
 
     def _continuous_matrices(self, pade: int | None) -> tuple[Array, Array, Array, Array]:
-        own = self._in_states
-        order, inputs, outputs = len(own["a"]), len(self.inputs), len(self.outputs)
-        shapes = {"a": (order, order), "b": (order, inputs), "c": (outputs, order), "d": (outputs, inputs)}
-        a, b, c, d = (np.reshape(np.array(own[name], dtype=np.float64), shape) for name, shape in shapes.items())
-        if not any(own["delays"]):
-            return a, b, c, d
+        matrices, delays = self._matrices_in_seconds(), self._in_states["delays"]
+        if not any(delays):
+            return matrices
         if pade is None:
             raise ValueError(
                 "the model has a dead time, which matrices in continuous time cannot have: pade=3 approximates it, converted(seconds) samples it"
             )
-        return _convert.with_pade((a, b, c, d), own["delays"], _options.count("pade", pade, 20))
+        return _convert.with_pade(matrices, delays, _options.count("pade", pade, 20))
+
+    def _matrices_in_seconds(self) -> tuple[Array, Array, Array, Array]:
+        """A, B, C and D in continuous time, without dead times."""
+        own = self._in_states
+        order, inputs, outputs = len(own["a"]), len(self.inputs), len(self.outputs)
+        shapes = {"a": (order, order), "b": (order, inputs), "c": (outputs, order), "d": (outputs, inputs)}
+        a, b, c, d = (np.reshape(np.array(own[name], dtype=np.float64), shape) for name, shape in shapes.items())
+        return a, b, c, d
 
     def _denominators(self) -> list[Array]:
         return [np.convolve(self.a, f) for f in self.f]

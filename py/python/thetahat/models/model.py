@@ -407,7 +407,13 @@ class Model(ConvertibleModel, KnownModels):
         array([19. , 18.9, 13.4])
         """
         points = _options.count("points", points)
-        return FrequencyResponse(self._model.frequency_response(w, points, self._output(output)))
+        place = self._output(output)
+        found = self._model.frequency_response(w, points, place)
+        if not found:
+            raise ValueError(
+                "model: it has no inputs, and with several outputs no response to the noise: there is no frequency response"
+            )
+        return FrequencyResponse(found, self.outputs[place])
 
     def step_response(
         self, input: int | str = 0, samples: int | None = None, *, output: int | str | None = None

@@ -34,7 +34,12 @@ class Forecast:
     """
 
     def __init__(
-        self, time: Array, values: Array, standard_deviations: Array, clock: Clock | None = None, outputs: Sequence[str] = ("y",)
+        self,
+        time: Array,
+        values: Array,
+        standard_deviations: Array,
+        clock: Clock | None = None,
+        outputs: Sequence[str] = ("y",),
     ) -> None:
         self.time = time
         self.values = values
@@ -109,9 +114,12 @@ class FrequencyResponse(Table):
         The phase is in radians and does not jump.
     magnitude_errors, phase_errors : ndarray, shape (sources, K)
         Standard errors; NaN where no theory gives one.
+    output : str or None
+        The name of the output, where it is known.
     """
 
-    def __init__(self, sources: Sequence[tuple[str | None, Sequence[Array]]]) -> None:
+    def __init__(self, sources: Sequence[tuple[str | None, Sequence[Array]]], output: str | None = None) -> None:
+        self.output = output
         self.sources = ["noise" if name is None else name for name, _ in sources]
         columns = np.array([list(columns) for _, columns in sources])
         self.frequencies: Array = columns[0, 0]

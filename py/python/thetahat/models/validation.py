@@ -123,7 +123,7 @@ class Validation(Document, Table):
         found: dict[str, float] = {}
         for residuals in self.document["residuals"]:
             for one in residuals["independence"]:
-                value = _p_value(one)
+                value = p_value(one)
                 known = found.get(one["input"], float("nan"))
                 found[one["input"]] = known if value is None or value > known else value
         return found
@@ -154,6 +154,7 @@ def fit_rows(document: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _p_value(independence: Mapping[str, Any]) -> float | None:
+def p_value(independence: Mapping[str, Any]) -> float | None:
+    """That of the test of past inputs."""
     value = independence.get("past", independence).get("p_value")
     return None if value is None else float(value)

@@ -1,8 +1,12 @@
 """Pictures of logs, models and validations, drawn with matplotlib (``pip install thetahat[plot]``).
 
-Each function draws into the axes that it is given, or makes a figure, and returns the axes. None of them shows or saves a
-figure: ``ax.figure.savefig("fit.png")`` does, or ``matplotlib.pyplot.show()``. Bands are uncertainty: pointwise intervals
-that hold the truth with the probability ``level``; there is no band where no theory gives one.
+Each function draws into the axes that it is given, or makes a figure, and returns the axes. None of them shows or
+saves a figure: ``ax.figure.savefig("fit.png")`` does, or ``matplotlib.pyplot.show()``. Bands are uncertainty: pointwise
+intervals that hold the truth with the probability ``level``; there is no band where no theory gives one.
+
+Logs and models of several outputs are drawn with axes for each, unless ``output`` names one. Where the clock of a log
+has dates, the axes of time have them too, in its time zone. Legends stand above the axes, where they cover nothing;
+a figure of your own makes place for them with ``matplotlib.pyplot.subplots(layout="constrained")``.
 
 >>> import thetahat as th
 >>> from thetahat import plot
@@ -18,14 +22,16 @@ except ImportError as error:
     raise ImportError("thetahat.plot draws with matplotlib: pip install thetahat[plot]") from error
 
 from thetahat.plot.logs import inspection, log
-from thetahat.plot.models import fit, poles_zeros, residuals, selection
+from thetahat.plot.models import fit, forecast, residuals, selection
 from thetahat.plot.responses import bode, impulse, step, step_test
+from thetahat.plot.roots import poles_zeros
 from thetahat.plot.trajectories import changes, parameters, states
 
 __all__ = [
     "bode",
     "changes",
     "fit",
+    "forecast",
     "impulse",
     "inspection",
     "log",

@@ -11,25 +11,31 @@ from thetahat.base import numbers as _numbers
 from thetahat.logs.inspection import Inspection
 from thetahat.logs.log import Log
 from thetahat.plot import drawing as _drawing
+from thetahat.plot.timeline import Timeline
 
 Grid = npt.NDArray[Any]
 """An array of matplotlib axes."""
 
 
-def log(log: Log, axes: Any = None) -> Grid:
-    """The signals of a log over time: the output, and below it each input.
+def log(log: Log, axes: Any = None, *, output: int | str | None = None) -> Grid:
+    """The signals of a log over time: each output, and below them each input.
+
+    Where the clock of the log has dates, the axis of time has them too, in the time zone of the log.
 
     Parameters
     ----------
     log : Log
         The data. Inputs are drawn as held from one sample to the next. Experiments follow one another, whatever their
-        clocks say, with a line where one begins.
-    axes : array_like of Axes, shape (1 + inputs,), optional
+        clocks say, with a line where one begins; where the log has dates, they lie at these, unless most of the axis
+        would lie between them. More than 20000 rows are drawn by their outline: the least and the greatest of neighbours.
+    axes : array_like of Axes, shape (outputs + inputs,), optional
         Where to draw.
+    output : int or str, optional
+        Which of several outputs, by its position or its name; all of them, unless said otherwise.
 
     Returns
     -------
-    ndarray of Axes, shape (1 + inputs,)
+    ndarray of Axes, shape (outputs + inputs,)
 
     Examples
     --------
@@ -39,15 +45,15 @@ def log(log: Log, axes: Any = None) -> Grid:
     ['y', 'u']
     """
     _drawing.expect("log", log, Log)
-    signals = [(log.output, log.y, "default")]
-    signals += [(name, values, "steps-post") for name, values in zip(log.inputs, log.u.T)]
+    signals = [(name, "default") for name in _drawing.chosen(log.outputs, output)]
+    signals += [(name, "steps-post") for name in log.inputs]
     grid = _drawing.grid(axes, len(signals), 1)[:, 0]
-    for ax, (name, values, style) in zip(grid, signals):
-        time, values = _drawing.broken(log, values)
-        ax.plot(time, values, drawstyle=style, **_drawing.lone(values))
-        ax.set_ylabel(_drawing.shown(name))
-        _drawing.boundaries(ax, log)
-    grid[-1].set_xlabel("time [s]")
+    timeline = Timeline.of_log(log)
+    for ax, (name, style) in zip(grid, signals):
+        time, values = timeline.broken(log[name])
+        _drawing.curve(ax, time, values, drawstyle=style)
+        _drawing.ylabel(ax, name)
+    timeline.onto(grid)
     return grid
 
 
@@ -83,7 +89,7 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
     if not document["excitation"]:
         raise ValueError("inspection: the log has no inputs; there is nothing to draw")
     output = next((channel["name"] for channel in document["channels"] if channel["role"] == "output"), "the output")
-    grid = _drawing.grid(axes, len(document["excitation"]), 2, sharex=False)
+    grid = _drawing.grid(axes, len(document["excitation"]), 2, sharex=False, height=2.6)
     for (left, right), excitation in zip(grid, document["excitation"]):
         name = excitation["input"]
         # Frequency 0 has no place on a logarithmic axis.
@@ -93,7 +99,7 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
         left.set_yscale("log")
         left.set_xlabel("frequency [rad/s]")
         left.set_ylabel("power density")
-        left.set_title(_drawing.shown(f"spectrum of {name}"))
+        _drawing.title(left, f"spectrum of {name}")
         title = f"from {name} to {output}"
         delay = delays.get(name)
         if delay is not None:
@@ -104,6 +110,7 @@ def inspection(inspection: Inspection, axes: Any = None) -> Grid:
             _drawing.correlation(right, np.arange(len(values)) - len(following), values, band)
             nk = delay["nk"]
             title += ": no delay found" if nk is None else f": a delay of {nk} sample{'' if nk == 1 else 's'}"
-        right.set_ylabel("prewhitened correlation")
-        right.set_title(_drawing.shown(title))
+        _drawing.ylabel(right, "prewhitened correlation")
+        _drawing.title(right, title)
+    _drawing.legend(grid[:, 1])
     return grid

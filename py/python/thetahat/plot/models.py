@@ -1,14 +1,15 @@
-"""Pictures of models: what they say of a log, what they leave, their roots, and the search for them."""
+"""Pictures of models: what they say of a log, what they leave, and the search for them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle
+from matplotlib.colors import to_rgb
 from matplotlib.ticker import MaxNLocator
 
 from thetahat import _thetahat
@@ -16,9 +17,11 @@ from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.logs.log import Log
 from thetahat.models.model import Model
-from thetahat.models.validation import Validation
+from thetahat.models.responses import Forecast
+from thetahat.models.validation import Validation, p_value
 from thetahat.plot import drawing as _drawing
 from thetahat.plot.responses import Models
+from thetahat.plot.timeline import Timeline
 
 Grid = npt.NDArray[Any]
 """An array of matplotlib axes."""
@@ -30,20 +33,17 @@ _CRITERIA = {word: name for word, name, _ in _thetahat.CRITERIA} | {
 _LOGARITHMIC = {word for word, _, logarithmic in _thetahat.CRITERIA if logarithmic}
 """Criteria that are the logarithm of the cost and a penalty."""
 
-_FARTHEST = 3.0
-"""Roots farther out than this are named and not shown: they would make a dot of the unit circle."""
-
 
 def fit(
     models: Models,
     log: Log,
     horizon: int | None = None,
-    ax: Axes | None = None,
+    ax: Any = None,
     *,
     output: int | str | None = None,
     level: float = 0.95,
-) -> Axes:
-    """The measured output, and what models say of it.
+) -> Any:
+    """The measured outputs, and what models say of them.
 
     The legend tells the fit of each, 100 (1 - ||y - yhat||/||y - mean(y)||), on the rows that are drawn.
 
@@ -55,17 +55,17 @@ def fit(
         The data, best those that the models were not fitted to.
     horizon : int or None, default None
         Steps ahead; None is a free run: the inputs alone drive the model.
-    ax : Axes, optional
+    ax : Axes, or array_like of them, shape (outputs,), optional
         Where to draw.
     output : int or str, optional
-        Which output, where models have several: its position, or its name.
+        Which output, where models have several: its position, or its name; all of them, unless said otherwise.
     level : float, default 0.95
         The probability with which the band holds the measured output. A free run has no band: nothing is known of how its
         noise began.
 
     Returns
     -------
-    Axes
+    Axes, or ndarray of Axes, shape (outputs,), where there are several outputs
 
     See Also
     --------
@@ -82,37 +82,38 @@ def fit(
     """
     _drawing.expect("log", log, Log)
     named = _drawing.named(models, (Model,))
+    wanted = {name: _drawing.chosen(model.outputs, output) for name, model in named}
     # A channel of the log is found by its name, as a prediction finds it.
-    which = {name: model._output(output) for name, model in named}
-    measured = {model.outputs[which[name]]: log[model.outputs[which[name]]] for name, model in named}
-    ax = _drawing.one(ax)
-    for name, values in measured.items():
-        time, values = _drawing.broken(log, values)
-        label = "measured" if len(measured) == 1 else _drawing.shown(f"measured {name}")
-        ax.plot(time, values, color="0.4", linewidth=1.0, label=label, **_drawing.lone(values))
+    measured = {channel: log[channel] for channels in wanted.values() for channel in channels}
+    grid = _drawing.grid(ax, len(measured), 1, argument="ax", height=3.2)[:, 0]
+    places = dict(zip(measured, grid))
+    timeline = Timeline.of_log(log)
+    for channel, values in measured.items():
+        _drawing.curve(places[channel], *timeline.broken(values), color="0.4", linewidth=1.0, label="measured")
     far = "free run" if horizon is None else "1 step ahead" if horizon == 1 else f"{horizon} steps ahead"
-    bands = []
-    drawn_all = []
-    for name, model in named:
-        place = which[name]
-        values = _column(model.predict(log, horizon), place)
-        percent = _drawing.percent(measured[model.outputs[place]], values)
-        time, drawn = _drawing.broken(log, values)
-        drawn_all.append(drawn)
-        label = _drawing.shown(f"{name}, {far}" + (f": {_drawing.fixed(percent, 2)} %" if isfinite(percent) else ""))
-        (line,) = ax.plot(time, drawn, linewidth=1.0, label=label, **_drawing.lone(drawn))
-        if horizon is not None:
-            ends = np.moveaxis(model.predict_interval(log, horizon, level=level), -1, 0)
-            low, high = (_drawing.broken(log, _column(end, place))[1] for end in ends)
-            bands.append(_drawing.band(ax, time, low, high, line.get_color()))
-    _drawing.label_one(bands, level)
-    _drawing.boundaries(ax, log)
-    _drawing.scale_to(ax, list(measured.values()), drawn_all)
-    ax.set_xlabel("time [s]")
-    ax.set_ylabel(_drawing.shown(", ".join(measured)))
-    # To find the best place takes long in a long log.
-    ax.legend(loc="best" if len(log) <= 20_000 else "upper right")
-    return ax
+    bands: dict[str, list[Any]] = {channel: [] for channel in measured}
+    drawn_all: dict[str, list[_drawing.Array]] = {channel: [] for channel in measured}
+    for colour, (name, model) in enumerate(named):
+        all_values = model.predict(log, horizon)
+        ends = None if horizon is None else np.moveaxis(model.predict_interval(log, horizon, level=level), -1, 0)
+        for channel in wanted[name]:
+            place, on = model.outputs.index(channel), places[channel]
+            values = _column(all_values, place)
+            percent = _drawing.percent(measured[channel], values)
+            label = f"{name}, {far}" + (f": {_drawing.fixed(percent, 2)} %" if isfinite(percent) else "")
+            time, drawn = timeline.broken(values)
+            _drawing.curve(on, time, drawn, color=f"C{colour}", linewidth=1.0, label=_drawing.shown(label))
+            drawn_all[channel].append(drawn)
+            if ends is not None:
+                _, low, high = timeline.broken(*(_column(end, place) for end in ends))
+                bands[channel].append(_drawing.band(on, time, low, high, f"C{colour}"))
+    timeline.onto(grid)
+    for channel, on in places.items():
+        _drawing.label_one(bands[channel], level)
+        _drawing.scale_to(on, [measured[channel]], drawn_all[channel])
+        _drawing.ylabel(on, channel)
+        _drawing.legend(on)
+    return _drawing.alone(grid)
 
 
 def _column(values: npt.NDArray[np.float64], place: int) -> npt.NDArray[np.float64]:
@@ -120,12 +121,96 @@ def _column(values: npt.NDArray[np.float64], place: int) -> npt.NDArray[np.float
     return values if values.ndim == 1 else values[:, place]
 
 
-def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) -> Grid:
+def forecast(
+    log: Log,
+    forecast: Forecast,
+    ax: Any = None,
+    *,
+    last: int | None = None,
+    levels: Sequence[float] = (0.5, 0.8, 0.95),
+    output: int | str | None = None,
+) -> Any:
+    """The end of a log, what is expected after it, and the fan of its intervals.
+
+    Parameters
+    ----------
+    log : Log
+        The log that was forecast; where it goes on after that, what came is drawn too.
+    forecast : Forecast
+        Of `thetahat.Model.forecast`.
+    ax : Axes, or array_like of them, shape (outputs,), optional
+        Where to draw.
+    last : int, optional
+        How many rows before the forecast; three times as many as it has steps, and 30 or more, unless said otherwise.
+    levels : sequence of float, default (0.5, 0.8, 0.95)
+        The probabilities with which the intervals hold the output at a time; the narrower, the darker.
+    output : int or str, optional
+        Which of several outputs, by its position or its name; all of them, unless said otherwise.
+
+    Returns
+    -------
+    Axes, or ndarray of Axes, shape (outputs,), where there are several outputs
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from thetahat import plot
+    >>> log = th.dc_motor()
+    >>> model = th.arx(log[:900], na=2, nb=2)
+    >>> ax = plot.forecast(log[:900], model.forecast(log[:900], 30, log.u[900:930]))
+    >>> [text.get_text() for text in ax.get_legend().get_texts()]
+    ['measured', 'forecast', '95 %', '80 %', '50 %']
+    """
+    _drawing.expect("log", log, Log)
+    _drawing.expect("forecast", forecast, Forecast)
+    quantiles = {level: _options.quantile(level) for level in sorted(levels, reverse=True)}
+    outputs = _drawing.chosen(forecast.outputs, output)
+    measured = {name: log[name] for name in outputs}
+    steps = len(forecast.values)
+    timeline = Timeline.of_log(log)
+    # Rows of the last experiment before the forecast.
+    own = log.experiments[-1]
+    begins = own.start + int(np.searchsorted(log.time[own.start :], forecast.time[0] - log.sample_time / 2))
+    if begins == own.start:
+        raise ValueError("log: it begins after the forecast; give the log that was forecast")
+    shown = max(30, 3 * steps) if last is None else _options.count("last", last)
+    first, end = max(0, begins - shown), min(len(log), begins + steps)
+    x = timeline.after(begins, forecast.time - log.time[begins - 1], forecast._clock)
+    grid = _drawing.grid(ax, len(outputs), 1, argument="ax", height=2.6)[:, 0]
+    for on, name in zip(grid, outputs):
+        place = forecast.outputs.index(name)
+        values, deviations = _column(forecast.values, place), _column(forecast.standard_deviations, place)
+        past, drawn = timeline.part(first, end), measured[name][first:end]
+        _drawing.curve(on, *past.broken(drawn), color="0.3", linewidth=1.0, label="measured")
+        # From the last measured value on.
+        known = np.flatnonzero(np.isfinite(drawn[: begins - first]))[-1:]
+        time = np.concatenate([past.x[known], x])
+        values = np.concatenate([drawn[known], values])
+        deviations = np.concatenate([np.zeros(len(known)), deviations])
+        _drawing.curve(on, time, values, color="C0", label="forecast")
+        for number, (level, quantile) in enumerate(quantiles.items()):
+            half = quantile * deviations
+            # The narrow ones lie over the wide, as dark as their entries in the legend.
+            share = 0.15 + 0.4 * (number + 1) / len(quantiles)
+            shade = share * np.array(to_rgb("C0")) + (1 - share) * np.array(to_rgb(on.get_facecolor()))
+            band = _drawing.band(on, time, values - half, values + half, tuple(shade), None)
+            if band is not None:
+                band.set_label(f"{100 * level:g} %")
+        _drawing.ylabel(on, name)
+    timeline.part(first, end).onto(grid)
+    _drawing.legend(grid)
+    return _drawing.alone(grid)
+
+
+def residuals(
+    of: Validation | Model, log: Log | None = None, axes: Any = None, *, output: int | str | None = None
+) -> Grid:
     """The correlation of the one-step errors with themselves and with each input.
 
-    The titles say what the tests find at the level of the validation, 0.05 unless said otherwise: errors are not white, or
-    not independent of an input, where their p-value is below it. White errors stay inside the band at 95 of 100 lags. Outside of it at positive lags of an input: past inputs are still in
-    the errors, so the model lacks dynamics or delay. At negative lags: the input follows the output, there is feedback.
+    The titles say what the tests find at the level of the validation, 0.05 unless said otherwise: errors are not white,
+    or not independent of an input, where their p-value is below it. White errors stay inside the band at 95 of 100 lags.
+    Outside of it at positive lags of an input: past inputs are still in the errors, so the model lacks dynamics or delay.
+    At negative lags: the input follows the output, there is feedback.
 
     Parameters
     ----------
@@ -133,12 +218,14 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
         What to draw.
     log : Log, optional
         The data to validate a model on.
-    axes : array_like of Axes, shape (1 + inputs,), optional
+    axes : array_like of Axes, shape (1 + inputs,), of several outputs (outputs, 1 + inputs), optional
         Where to draw.
+    output : int or str, optional
+        Which of several outputs, by its position or its name; all of them, unless said otherwise.
 
     Returns
     -------
-    ndarray of Axes, shape (1 + inputs,)
+    ndarray of Axes, shape (1 + inputs,), of several outputs (outputs, 1 + inputs)
 
     Raises
     ------
@@ -161,91 +248,28 @@ def residuals(of: Validation | Model, log: Log | None = None, axes: Any = None) 
     elif log is not None:
         raise TypeError("log: the validation has a log of its own; leave it out")
     _drawing.expect("of", of, Validation)
-    if len(of.document["noise"]) > 1:
-        raise ValueError("of: there are several outputs; the page of the validation shows them all")
-    tests = next(iter(of.document["residuals"]), None)
-    if tests is None:
+    tested = {tests["output"]: tests for tests in of.document["residuals"]}
+    wanted = _drawing.chosen([noise["output"] for noise in of.document["noise"]], output)
+    if not all(name in tested for name in wanted):
         raise ValueError("of: the residuals could not be tested; there are too few samples")
-    inputs = tests["independence"]
-    grid = _drawing.grid(axes, 1 + len(inputs), 1, sharex=False)[:, 0]
-
-    values = _numbers.of_document(tests["autocorrelation"])[1:]
-    _drawing.correlation(grid[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
-    grid[0].set_title("residuals" + _drawing.verdict("white", of.whiteness, of.alpha))
-    grid[0].set_ylabel("autocorrelation")
-    for ax, test in zip(grid[1:], inputs):
-        values = _numbers.of_document(test["correlation"])
-        _drawing.correlation(ax, np.arange(len(values)) - len(values) // 2, values, _numbers.of_document(test["band"]))
-        name = test["input"]
-        verdict = _drawing.verdict("independent", of.independence[name], of.alpha)
-        ax.set_title(_drawing.shown(f"residuals and {name}{verdict}"))
-        ax.set_ylabel("correlation")
-    return grid
-
-
-def poles_zeros(model: Model, ax: Axes | None = None, *, level: float = 0.95) -> Axes:
-    """The poles and zeros of a model in the z plane, with the unit circle.
-
-    Poles inside the circle decay and outside they grow; the nearer to the circle, the more slowly. Complex roots have
-    ellipses and real ones intervals that hold the root with the probability ``level``, to first order.
-
-    Parameters
-    ----------
-    model : Model
-        What to draw.
-    ax : Axes, optional
-        Where to draw.
-    level : float, default 0.95
-        The probability.
-
-    Returns
-    -------
-    Axes
-
-    Notes
-    -----
-    A root with the covariance S of its real and imaginary part lies, with the probability p, where d' S^-1 d is below the
-    quantile of chi-square for two degrees of freedom, -2 ln(1 - p). Roots near to one another have no S: there the first
-    order does not hold.
-
-    Examples
-    --------
-    >>> import thetahat as th
-    >>> from thetahat import plot
-    >>> ax = plot.poles_zeros(th.armax(th.dc_motor(), na=2, nb=2, nc=1))
-    >>> [text.get_text() for text in ax.get_legend().get_texts()]
-    ['poles', 'zeros from u', 'noise zeros']
-    """
-    _drawing.expect("model", model, Model)
-    half = _options.quantile(level)
-    own = model.document["model"]
-    groups = [("poles", own["poles"], "x")]
-    groups += [(f"zeros from {name}", roots, "o") for name, roots in zip(model.inputs, own["zeros"])]
-    groups += [("noise poles", own["noise_poles"], "+"), ("noise zeros", own["noise_zeros"], "D")]
-    ax = _drawing.one(ax)
-    ax.add_patch(Circle((0, 0), 1, fill=False, color="0.6", linewidth=0.8))
-    ax.axhline(0, color="0.85", linewidth=0.8, zorder=0)
-    ax.axvline(0, color="0.85", linewidth=0.8, zorder=0)
-    reach = 1.0
-    for name, roots, marker in groups:
-        if not roots:
-            continue
-        places = np.array([complex(root["re"], root["im"]) for root in roots])
-        near = np.abs(places) <= _FARTHEST
-        away = ", ".join(f"{place:.4g}" if place.imag else f"{place.real:.4g}" for place in places[~near])
-        label = f"{name}, outside of the picture: {away}" if away else name
-        (line,) = ax.plot(places.real, places.imag, marker, fillstyle="none", label=_drawing.shown(label))
-        reach = float(np.max([np.abs(places[near].real), np.abs(places[near].imag)], initial=reach))
-        for root in roots:
-            _drawing.region(ax, root, half, level, line.get_color())
-    ax.set_xlim(-1.15 * reach, 1.15 * reach)
-    ax.set_ylim(-1.15 * reach, 1.15 * reach)
-    ax.set_aspect("equal")
-    ax.set_xlabel("real part")
-    ax.set_ylabel("imaginary part")
-    if ax.get_legend_handles_labels()[0]:
-        ax.legend()
-    return ax
+    several, count = len(wanted) > 1, 1 + len(tested[wanted[0]]["independence"])
+    rows, columns = (len(wanted), count) if several else (count, 1)
+    grid = _drawing.grid(axes, rows, columns, sharex=False, height=2.6)
+    for row, name in zip(grid if several else [grid[:, 0]], wanted):
+        tests = tested[name]
+        called = f"residuals of {name}" if several else "residuals"
+        values = _numbers.of_document(tests["autocorrelation"])[1:]
+        _drawing.correlation(row[0], np.arange(1, len(values) + 1), values, np.full(len(values), tests["band"]))
+        _drawing.title(row[0], called + _drawing.verdict("white", tests["ljung_box"]["p_value"], of.alpha))
+        row[0].set_ylabel("autocorrelation")
+        for ax, test in zip(row[1:], tests["independence"]):
+            values, half = _numbers.of_document(test["correlation"]), _numbers.of_document(test["band"])
+            _drawing.correlation(ax, np.arange(len(values)) - len(values) // 2, values, half)
+            verdict = _drawing.verdict("independent", p_value(test), of.alpha)
+            _drawing.title(ax, f"{called} and {test['input']}{verdict}")
+            ax.set_ylabel("correlation")
+    _drawing.legend(grid)
+    return grid if several else grid[:, 0]
 
 
 def selection(model: Model, ax: Axes | None = None) -> Axes:
@@ -309,5 +333,5 @@ def selection(model: Model, ax: Axes | None = None) -> Axes:
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlabel("number of parameters")
     ax.set_ylabel(_CRITERIA[by] if logarithmic else "mean of e²")
-    ax.legend()
+    _drawing.legend(ax)
     return ax

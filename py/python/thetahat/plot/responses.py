@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Union
+from math import ceil
+from typing import Any, NamedTuple, Union
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from thetahat.engine import options as _options
 from thetahat.experiments.spectrum import MeasuredResponse
@@ -38,6 +40,8 @@ def bode(
     sources: Sequence[str] | str | None = None,
     output: int | str | None = None,
     level: float = 0.95,
+    decibels: bool = False,
+    hertz: bool = False,
 ) -> Grid:
     """Magnitude and phase over frequency.
 
@@ -47,19 +51,29 @@ def bode(
         What to draw; models beside a measured response lie over it.
     w : array_like, optional
         Frequencies in radians per second, as for `thetahat.Model.frequency_response`.
-    axes : array_like of Axes, shape (2, sources), optional
-        Where to draw: the magnitudes, and below them the phases. Of one source, shape (2,) does too.
+    axes : array_like of Axes, shape (2 outputs, sources), optional
+        Where to draw: the magnitudes of an output, and below them the phases. Of one source, shape (2 outputs,) does
+        too.
     sources : str or sequence of str, optional
         The inputs to draw the responses to, or ``"noise"``; all inputs, unless said otherwise, or the noise where there are
         none.
     output : int or str, optional
-        Of which output, where models have several: its position, or its name.
+        Of which output, where models have several: its position, or its name; of all of them, unless said otherwise.
     level : float, default 0.95
         The probability with which the bands hold the response at a frequency.
+    decibels : bool, default False
+        Magnitudes in decibels, 20 log10 of them.
+    hertz : bool, default False
+        The axis of frequency in hertz; ``w`` stays in radians per second.
 
     Returns
     -------
-    ndarray of Axes, shape (2, sources)
+    ndarray of Axes, shape (2 outputs, sources)
+
+    Notes
+    -----
+    Phases do not jump, and lie on the branch nearest to that of the first response. Where a phase is not known to half a
+    turn, its band is a full turn.
 
     Examples
     --------
@@ -72,7 +86,9 @@ def bode(
     (2, 1)
     >>> axes[1, 0].get_xlabel()
     'frequency [rad/s]'
-    >>> axes = plot.bode({"measured": th.spectrum(log), **models})
+    >>> axes = plot.bode({"measured": th.spectrum(log), **models}, decibels=True)
+    >>> axes[0, 0].get_ylabel()
+    'magnitude [dB]'
     """
     found: list[tuple[str, FrequencyResponse]] = []
     for name, one in _drawing.named(models, (Model, FrequencyResponse, MeasuredResponse)):
@@ -80,7 +96,11 @@ def bode(
             raise TypeError(f"w: a {type(one).__name__} has its own frequencies; leave it out")
         if isinstance(one, MeasuredResponse):
             one = one.to_frequency_response()
-        found.append((name, one.frequency_response(w, points=300, output=output) if isinstance(one, Model) else one))
+        if isinstance(one, Model):
+            outputs = _drawing.chosen(one.outputs, output)
+            found += [(name, one.frequency_response(w, points=300, output=to)) for to in outputs]
+        else:
+            found.append((name, one))
     there_are = list(dict.fromkeys(source for _, response in found for source in response.sources))
     # The noise comes last, where a model says what becomes of it.
     inputs = [source for source in there_are if source != "noise"]
@@ -89,65 +109,121 @@ def bode(
         if source not in there_are:
             raise ValueError(f"sources: there is no {source}; there are: {', '.join(there_are)}")
     half = _options.quantile(level)
-    grid = _drawing.grid(axes, 2, len(wanted))
-    for column, source in enumerate(wanted):
-        above, below = grid[:, column]
-        bands = []
-        for name, response in found:
-            if source not in response.sources:
-                continue
-            row = response.sources.index(source)
-            x, magnitude, phase = response.frequencies, response.magnitude[row], np.degrees(response.phase[row])
-            (line,) = above.plot(x, magnitude, label=_drawing.shown(name), **_drawing.lone(magnitude))
-            below.plot(x, phase, label=_drawing.shown(name), color=line.get_color(), **_drawing.lone(phase))
-            spread = half * response.magnitude_errors[row]
-            # The logarithm of what is not above zero has no place.
-            lowest = np.min(magnitude[magnitude > 0], initial=np.inf) / 10
-            low = np.maximum(magnitude - spread, lowest)
-            bands.append(_drawing.band(above, x, low, magnitude + spread, line.get_color()))
-            spread = half * np.degrees(response.phase_errors[row])
-            _drawing.band(below, x, phase - spread, phase + spread, line.get_color())
-        _drawing.label_one(bands, level)
-        above.set_title(_drawing.shown(f"from {source}"))
-        above.set_xscale("log")
-        above.set_yscale("log")
-        below.set_xscale("log")
-        below.set_xlabel("frequency [rad/s]")
-        above.legend()
-    grid[0, 0].set_ylabel("magnitude")
-    grid[1, 0].set_ylabel("phase [°]")
+    # A response of which it is not known is of the first output.
+    outputs = list(dict.fromkeys(response.output for _, response in found if response.output is not None))
+    outputs = outputs or [""]
+    colours = {name: f"C{place}" for place, name in enumerate(dict.fromkeys(name for name, _ in found))}
+    grid = _drawing.grid(axes, 2 * len(outputs), len(wanted))
+    for row, to in enumerate(outputs):
+        of_output = [(name, response) for name, response in found if (response.output or outputs[0]) == to]
+        for above, below, source in zip(grid[2 * row], grid[2 * row + 1], wanted):
+            bands, first = [], None
+            for name, response in of_output:
+                if source not in response.sources:
+                    continue
+                curve = _Curve.of(response, source, half, hertz)
+                first = first or curve
+                curve = curve.on_branch_of(first)
+                bands.append(curve.draw(above, below, decibels, colours[name], _drawing.shown(name)))
+            _drawing.label_one(bands, level)
+            _drawing.title(above, f"from {source}" + (f" to {to}" if len(outputs) > 1 else ""))
+            for ax in (above, below):
+                ax.set_xscale("log")
+            if not decibels:
+                above.set_yscale("log")
+            below.yaxis.set_major_locator(_Degrees())
+        grid[2 * row, 0].set_ylabel("magnitude [dB]" if decibels else "magnitude")
+        grid[2 * row + 1, 0].set_ylabel("phase [°]")
+    for ax in grid[-1]:
+        ax.set_xlabel("frequency [Hz]" if hertz else "frequency [rad/s]")
+    _drawing.legend(grid)
     return grid
+
+
+class _Curve(NamedTuple):
+    """A frequency response from one source, with half its bands."""
+
+    frequencies: _drawing.Array
+    magnitude: _drawing.Array
+    magnitude_half: _drawing.Array
+    phase: _drawing.Array
+    """Degrees."""
+    phase_half: _drawing.Array
+
+    @classmethod
+    def of(cls, response: FrequencyResponse, source: str, half: float, hertz: bool) -> _Curve:
+        row = response.sources.index(source)
+        # More than half a turn to each side says nothing.
+        spread = np.minimum(half * np.degrees(response.phase_errors[row]), 180.0)
+        x = response.frequencies / (2 * np.pi) if hertz else response.frequencies
+        magnitude, phase = response.magnitude[row], np.degrees(response.phase[row])
+        return cls(x, magnitude, half * response.magnitude_errors[row], phase, spread)
+
+    def on_branch_of(self, other: _Curve) -> _Curve:
+        """The same with as many turns as the other has, where both are known."""
+        mine, yours = np.isfinite(self.phase), np.isfinite(other.phase)
+        if not (mine.any() and yours.any()):
+            return self
+        x, xs = self.frequencies[mine], other.frequencies[yours]
+        there = np.interp(x, xs, other.phase[yours], left=np.nan, right=np.nan)
+        apart = (there - self.phase[mine])[np.isfinite(there)]
+        turns = 360.0 * round(float(np.median(apart)) / 360.0) if apart.size else 0.0
+        return self if turns == 0 else self._replace(phase=self.phase + turns)
+
+    def draw(self, above: Axes, below: Axes, decibels: bool, colour: str, label: str) -> Any:
+        """Draws both, and gives the band of the magnitude."""
+        x, positive = self.frequencies, self.magnitude[self.magnitude > 0]
+        # The logarithm of what is not above zero has no place.
+        low = np.maximum(self.magnitude - self.magnitude_half, np.min(positive, initial=np.inf) / 10)
+        curves = [self.magnitude, low, self.magnitude + self.magnitude_half]
+        if decibels:
+            curves = [20 * np.log10(np.where(curve > 0, curve, np.nan)) for curve in curves]
+        _drawing.curve(above, x, curves[0], color=colour, label=label)
+        _drawing.curve(below, x, self.phase, color=colour, label=label)
+        _drawing.band(below, x, self.phase - self.phase_half, self.phase + self.phase_half, colour)
+        return _drawing.band(above, x, curves[1], curves[2], colour)
+
+
+class _Degrees(MaxNLocator):
+    """Ticks at quarters and eighths of a turn, where the axis has as much."""
+
+    def tick_values(self, vmin: float, vmax: float) -> Any:
+        turned = abs(vmax - vmin)
+        if turned < 90:
+            return super().tick_values(vmin, vmax)
+        step = next((step for step in (45, 90, 180, 360) if turned <= 6 * step), 360 * ceil(turned / 2160))
+        return MultipleLocator(step).tick_values(vmin, vmax)
 
 
 def step(
     models: Models,
-    input: int | str = 0,
+    input: int | str | None = None,
     samples: int | None = None,
-    ax: Axes | None = None,
+    ax: Any = None,
     *,
     output: int | str | None = None,
     level: float = 0.95,
-) -> Axes:
-    """The response of the output to a unit step of an input, from rest.
+) -> Any:
+    """The responses of the outputs to a unit step of each input, from rest.
 
     Parameters
     ----------
     models : Model, or a sequence of them, or dict of str to Model
         What to draw.
-    input : int or str, default 0
-        Which input, by its place or name.
+    input : int or str, optional
+        Which input, by its place or name; each of them, unless said otherwise.
     samples : int, optional
         How many; until each has settled, unless said otherwise.
-    ax : Axes, optional
+    ax : Axes, or array_like of them, shape (outputs, inputs), optional
         Where to draw.
     output : int or str, optional
-        Of which output, where models have several: its position, or its name.
+        Of which output, where models have several: its position, or its name; of all of them, unless said otherwise.
     level : float, default 0.95
         The probability with which the band holds the response at a time.
 
     Returns
     -------
-    Axes
+    Axes, or ndarray of Axes, shape (outputs, inputs), where there are several of either
 
     Examples
     --------
@@ -162,13 +238,13 @@ def step(
 
 def impulse(
     models: Models,
-    input: int | str = 0,
+    input: int | str | None = None,
     samples: int | None = None,
-    ax: Axes | None = None,
+    ax: Any = None,
     *,
     output: int | str | None = None,
     level: float = 0.95,
-) -> Axes:
+) -> Any:
     """The impulse responses of models, with their bands.
 
     Parameters
@@ -178,7 +254,7 @@ def impulse(
 
     Returns
     -------
-    Axes
+    Axes, or ndarray of Axes, shape (outputs, inputs), where there are several of either
 
     Examples
     --------
@@ -197,8 +273,8 @@ def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
     Parameters
     ----------
     test : StepTest
-        What was read off. Where there is a time constant to trust, the response of a first order lies over the data, and where there is a
-        damping that of a second.
+        What was read off. Where there is a time constant to trust, the response of a first order lies over the data, and
+        where there is a damping that of a second.
     log : Log
         The log that it was read off.
     ax : Axes, optional
@@ -246,8 +322,8 @@ def step_test(test: StepTest, log: Log, ax: Axes | None = None) -> Axes:
             modelled, name = 1 - decay * (np.cos(angle) + damping / rest * np.sin(angle)), "second order"
         ax.plot(grid, modelled, color="black", label=name)
     ax.set_xlabel("time since the step [s]")
-    ax.set_ylabel(_drawing.shown(f"{test.output}, as a fraction of its change"))
-    ax.legend()
+    _drawing.ylabel(ax, f"{test.output}, as a fraction of its change")
+    _drawing.legend(ax)
     return ax
 
 
@@ -255,30 +331,36 @@ def _transient(
     what: str,
     respond: Callable[..., TransientResponse],
     models: Models,
-    input: int | str,
+    input: int | str | None,
     samples: int | None,
-    ax: Axes | None,
+    ax: Any,
     output: int | str | None,
     level: float,
-) -> Axes:
+) -> Any:
     half = _options.quantile(level)
-    found = []
-    for name, model in _drawing.named(models, (Model,)):
+    named = _drawing.named(models, (Model,))
+    found: dict[tuple[str, str], list[tuple[int, str, TransientResponse]]] = {}
+    for place, (name, model) in enumerate(named):
+        if not model.inputs:
+            raise ValueError(f"input: {name} has no inputs to make a {what} of; plot.bode draws what becomes of its noise")
         if isinstance(input, str) and input not in model.inputs:
-            raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs) or 'none'}")
-        index = model.inputs.index(input) if isinstance(input, str) else input
-        response = respond(model, index, samples, output=output)
-        found.append((name, response, f"{model.outputs[model._output(output)]} per unit of {model.inputs[index]}"))
-    ax = _drawing.one(ax)
-    bands = []
-    for name, response, _ in found:
-        (line,) = ax.plot(response.time, response.values, label=_drawing.shown(name), **_drawing.lone(response.values))
-        spread = half * response.standard_errors
-        bands.append(
-            _drawing.band(ax, response.time, response.values - spread, response.values + spread, line.get_color())
-        )
-    _drawing.label_one(bands, level)
-    ax.set_xlabel(f"time since the {what} [s]")
-    ax.set_ylabel(_drawing.shown(", ".join(dict.fromkeys(unit for _, _, unit in found))))
-    ax.legend()
-    return ax
+            raise ValueError(f"input: {name} has no input {input}; there are: {', '.join(model.inputs)}")
+        for to in _drawing.chosen(model.outputs, output):
+            for source in _drawing.chosen(model.inputs, input, "input"):
+                response = respond(model, source, samples, output=to)
+                found.setdefault((to, source), []).append((place, name, response))
+    outputs, inputs = (list(dict.fromkeys(pair[side] for pair in found)) for side in (0, 1))
+    grid = _drawing.grid(ax, len(outputs), len(inputs), sharex=False, argument="ax")
+    for row, to in zip(grid, outputs):
+        for on, source in zip(row, inputs):
+            bands = []
+            for place, name, response in found.get((to, source), []):
+                time, values, spread = response.time, response.values, half * response.standard_errors
+                _drawing.curve(on, time, values, color=f"C{place}", label=_drawing.shown(name))
+                bands.append(_drawing.band(on, time, values - spread, values + spread, f"C{place}"))
+            _drawing.label_one(bands, level)
+            _drawing.ylabel(on, f"{to} per unit of {source}")
+    for on in grid[-1]:
+        on.set_xlabel(f"time since the {what} [s]")
+    _drawing.legend(grid)
+    return _drawing.alone(grid)

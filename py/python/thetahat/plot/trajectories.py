@@ -13,6 +13,7 @@ from thetahat.engine import options as _options
 from thetahat.online.filter import StateTrajectory
 from thetahat.online.tracked import TrackTrajectory
 from thetahat.plot import drawing as _drawing
+from thetahat.plot.timeline import Timeline
 
 Grid = npt.NDArray[Any]
 """An array of matplotlib axes."""
@@ -31,8 +32,8 @@ def states(trajectory: StateTrajectory, axes: Any = None, *, level: float = 0.95
     trajectory : StateTrajectory
         Of `thetahat.StateFilter.run`.
     axes : array_like of Axes, shape (states + parameters + 1,), optional
-        Where to draw: the last one has the normalised innovations squared (NIS) with their 95 % bounds. Of an observer, which knows no
-        noise, there is one less.
+        Where to draw: the last one has the normalised innovations squared (NIS) with their 95 % bounds. Of an observer,
+        which knows no noise, there is one less.
     level : float, default 0.95
         The probability with which the band holds the state.
 
@@ -66,26 +67,27 @@ def states(trajectory: StateTrajectory, axes: Any = None, *, level: float = 0.95
     names = [*trajectory.state_names, *trajectory.parameter_names]
     values, deviations = np.hstack([known, unknown]), np.hstack([deviations, spreads])
     grid = _drawing.grid(axes, len(names) + (not observes), 1)[:, 0]
+    timeline = Timeline.of_rows(trajectory.time, trajectory._clock)
     for place, (ax, name) in enumerate(zip(grid, names)):
-        time, drawn, spread = _drawing.gapped(trajectory.time, values[:, place], half * deviations[:, place])
-        (line,) = ax.plot(time, drawn, linewidth=1.0, label=given, **_drawing.lone(drawn))
+        time, drawn, spread = timeline.broken(values[:, place], half * deviations[:, place])
+        line = _drawing.curve(ax, time, drawn, linewidth=1.0, label=given)
         band = _drawing.band(ax, time, drawn - spread, drawn + spread, line.get_color())
         _drawing.label_one([band], level)
         # What is not known yet would make a line of what is.
         late = values[len(values) // 2 :, place], (half * deviations)[len(values) // 2 :, place]
         ends = [late[0]] if observes else [late[0] - late[1], late[0] + late[1]]
         _drawing.scale_to(ax, ends, [] if observes else [drawn - spread, drawn + spread])
-        ax.set_ylabel(_drawing.shown(name))
-    grid[0].legend(loc="upper right")
+        _drawing.ylabel(ax, name)
+    _drawing.legend(grid)
     if not observes:
         ax = grid[-1]
-        time, nis, low, high = _drawing.gapped(trajectory.time, trajectory.nis, *trajectory.nis_bounds.T)
-        ax.plot(time, nis, ".", markersize=3)
-        ax.plot(time, low, color="0.5", linewidth=0.8, label="95 % bounds")
-        ax.plot(time, high, color="0.5", linewidth=0.8)
+        time, nis, low, high = timeline.broken(trajectory.nis, *trajectory.nis_bounds.T)
+        _drawing.curve(ax, time, nis, marker=".", markersize=3, linestyle="none")
+        _drawing.curve(ax, time, low, color="0.5", linewidth=0.8, label="95 % bounds")
+        _drawing.curve(ax, time, high, color="0.5", linewidth=0.8)
         ax.set_ylabel("NIS")
-        ax.legend(loc="upper right")
-    grid[-1].set_xlabel("time [s]")
+        _drawing.legend(ax)
+    timeline.onto(grid)
     return grid
 
 
@@ -96,16 +98,16 @@ def parameters(trajectory: TrackTrajectory, axes: Any = None, *, output: str | N
     ----------
     trajectory : TrackTrajectory
         Of `thetahat.Tracker.run`. Several ways to forget are drawn one over the other.
-    axes : array_like of Axes, shape (parameters,), optional
+    axes : array_like of Axes, shape (parameters,), of several outputs (parameters, outputs), optional
         Where to draw.
     output : str, optional
-        Of which of several outputs.
+        Of which of several outputs; of all of them, unless said otherwise.
     level : float, default 0.95
         The probability with which the band holds the parameter.
 
     Returns
     -------
-    ndarray of Axes, shape (parameters,)
+    ndarray of Axes, shape (parameters,), of several outputs (parameters, outputs)
 
     Examples
     --------
@@ -120,30 +122,43 @@ def parameters(trajectory: TrackTrajectory, axes: Any = None, *, output: str | N
     """
     _drawing.expect("trajectory", trajectory, TrackTrajectory)
     half = _options.quantile(level)
-    grid = _drawing.grid(axes, len(trajectory.parameter_names), 1)[:, 0]
+    outputs = trajectory.outputs if output is None else [trajectory.outputs[trajectory._output(output)]]
+    several = len(outputs) > 1
+    timeline = Timeline.of_rows(trajectory.time, trajectory._clock)
+    grid = _drawing.grid(axes, len(trajectory.parameter_names), len(outputs))
+    for column, of_output in enumerate(outputs):
+        _parameters_of(trajectory, of_output, grid[:, column], timeline, half, level)
+        if several:
+            _drawing.title(grid[0, column], of_output)
+    timeline.onto(grid)
+    _drawing.legend(grid)
+    return grid if several else grid[:, 0]
+
+
+def _parameters_of(
+    trajectory: TrackTrajectory, output: str, axes: Grid, timeline: Timeline, half: float, level: float
+) -> None:
+    """Those of one output."""
     of_output = trajectory._output(output)
-    for column, (ax, name) in enumerate(zip(grid, trajectory.parameter_names)):
+    for column, (ax, name) in enumerate(zip(axes, trajectory.parameter_names)):
         bands, late, all_drawn = [], [], []
         for place, policy in enumerate(trajectory.forgetting):
             values = trajectory._of(trajectory.parameters, place, of_output)[:, column]
             errors = trajectory._of(trajectory.standard_errors, place, of_output)[:, column]
-            time, drawn, spread = _drawing.gapped(trajectory.time, values, half * errors)
-            (line,) = ax.plot(time, drawn, linewidth=1.0, label=policy, **_drawing.lone(drawn))
+            time, drawn, spread = timeline.broken(values, half * errors)
+            line = _drawing.curve(ax, time, drawn, linewidth=1.0, label=policy)
             bands.append(_drawing.band(ax, time, drawn - spread, drawn + spread, line.get_color()))
             late.append(values[len(values) // 2 :])
             all_drawn += [drawn, drawn - spread, drawn + spread]
         _drawing.label_one(bands, level)
         # What is not known yet would make a line of what is.
         _drawing.scale_to(ax, late, all_drawn)
-        mine = {None, trajectory.outputs[of_output]}
-        rows = sorted({alarm.row for alarm in trajectory.alarms if alarm.row is not None and alarm.output in mine})
+        mine = [alarm.row for alarm in trajectory.alarms if alarm.output in (None, output)]
+        rows = sorted({row for row in mine if row is not None})
         for number, row in enumerate(rows):
             label = {"label": "alarm"} if number == 0 else {}
-            ax.axvline(trajectory.time[row], color="0.5", linewidth=0.8, linestyle=":", **label)
-        ax.set_ylabel(_drawing.shown(name))
-    grid[0].legend(loc="upper right")
-    grid[-1].set_xlabel("time [s]")
-    return grid
+            ax.axvline(timeline.x[row], color="0.5", linewidth=0.8, linestyle=":", **label)
+        _drawing.ylabel(ax, name)
 
 
 def changes(trajectory: ChangeTrajectory, axes: Any = None) -> Grid:
@@ -188,6 +203,6 @@ def changes(trajectory: ChangeTrajectory, axes: Any = None) -> Grid:
         if given:
             ax.plot(*zip(*given), "v", markersize=5, fillstyle="none", label="alarm")
         ax.set_ylabel(name.replace("_", " "))
-        ax.legend(loc="upper right")
+    _drawing.legend(grid)
     grid[-1].set_xlabel("row")
     return grid

@@ -173,9 +173,24 @@ impl Model {
         })
     }
 
+    /// Of each output, predictions this many steps ahead, or a free run, of all rows of a log.
+    fn predict<'py>(
+        &self,
+        py: Python<'py>,
+        log: &Bound<'py, Log>,
+        horizon: Option<usize>,
+        initial: &str,
+    ) -> PyResult<Vec<Column<'py>>> {
+        let horizon = horizon.map_or(Horizon::FreeRun, |steps| Horizon::Steps { steps });
+        let start = self.start(initial, log.get(), horizon)?;
+        let (known, log) = (Arc::clone(&self.known), Arc::clone(&log.get().log));
+        let found = interruptible(py, move |_| known.predictions(&log, horizon, start))?;
+        Ok(found.into_iter().map(|values| PyArray1::from_vec(py, values)).collect())
+    }
+
     /// Of each output, the prediction of each row, and its standard deviations if there are steps.
     #[pyo3(signature = (log, horizon, initial))]
-    fn predict<'py>(
+    fn predict_with_deviations<'py>(
         &self,
         py: Python<'py>,
         log: &Bound<'py, Log>,

@@ -196,7 +196,7 @@ def test_several_outputs_are_a_map_each() -> None:
     run = model.simulate(data)
     assert run.shape == (800, 2)
     assert np.nanstd(y - run, axis=0) == pytest.approx([0.025, 0.022], rel=0.4)
-    lower, upper = model.predict_interval(data, 3).T
+    lower, upper = np.moveaxis(model.predict_interval(data, 3), -1, 0)
     inside = (y > lower) & (y < upper)
     assert inside[3:].mean() == pytest.approx(0.95, abs=0.03)
     checked = model.validate(data, rows=slice(600, 800), require=["fit>=90"])

@@ -335,7 +335,7 @@ def test_bad_steps_change_nothing() -> None:
         (([1.0, 2.0], -np.inf), {}, ValueError, "'force' is infinite in row 2"),
         (([1.0, 2.0], 0.5), {"seconds": 0.7}, ValueError, "0.7"),
         (([1.0, 2.0], 0.5), {"seconds": -0.5}, ValueError, "-0.5"),
-        (([1.0, 2.0], 0.5), {"seconds": "1"}, TypeError, "seconds: expected seconds"),
+        (([1.0, 2.0], 0.5), {"seconds": "1"}, ValueError, "seconds: it is no duration"),
         ((["a", "b"], 0.5), {}, TypeError, "y: expected numbers"),
     ]
     for arguments, options, error, message in cases:

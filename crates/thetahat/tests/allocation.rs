@@ -1,11 +1,17 @@
 //! Iterations of a search take no memory: more of them allocate no more. Samples of a tracker take none at all.
 
+use std::borrow::Cow;
+use std::ops::ControlFlow;
+
 use allocation_counter::measure;
-use thetahat::data::{Channel, Record, Recording, Rows, Source, Times};
+use thetahat::data::{Channel, Log, Record, Recording, Rows, Source, Times};
 use thetahat::estimate::{Initial, Method, Procedure, estimate};
+use thetahat::fit::FitDraft;
 use thetahat::inspect::{InspectionPlan, inspect};
 use thetahat::model::Orders;
 use thetahat::optimize::{Algorithm, Search};
+use thetahat::plan::{FitOptions, Fitted};
+use thetahat::respond::{Horizon, InitialCondition};
 use thetahat::track::{TrackMethod, TrackPlan, Tracker};
 use thetahat_numerics::noise::Noise;
 
@@ -118,4 +124,37 @@ fn an_inspection_takes_no_more_than_it_says_for_each_value() {
     // Besides the values themselves, which were there before.
     let each = counted.bytes_max as f64 / (2 * rows) as f64;
     assert!(each < 40.0, "{each} bytes for each value");
+}
+
+/// What a fit by least squares and its predictions take beside a log of an output and an input: 16 bytes a row.
+#[test]
+fn a_fit_and_its_predictions_copy_a_long_log_once() {
+    const ROWS: usize = 200_000;
+    let (u, e) = (Noise(5).take(ROWS), Noise(6).take(ROWS));
+    let mut y = vec![0.0; ROWS];
+    for t in 1..ROWS {
+        y[t] = 3.0 + 0.8 * (y[t - 1] - 3.0) + u[t - 1] + 0.1 * e[t];
+    }
+    let channel = |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
+    let log = Log::new(vec![channel("u", &u), channel("y", &y)], 1.0).unwrap();
+    let options: FitOptions = serde_json::from_str(r#"{ "model": "arx", "na": "1", "nb": "1" }"#).unwrap();
+    let draft = FitDraft::new(&options, Fitted::Log { several_outputs: false }).unwrap();
+    let plan = draft.plan(vec!["u".to_owned()], vec!["y".to_owned()]).unwrap();
+    let mut pending = None;
+    let fitted = measure(|| {
+        pending = Some(plan.begin(Cow::Owned(log.clone()), &[], &|_| ControlFlow::Continue(())).unwrap());
+    });
+    let data = 16.0 * ROWS as f64;
+    let of_data = |bytes: i64| bytes as f64 / data;
+    assert!(of_data(fitted.bytes_max as i64) < 1.2, "{} of the data", of_data(fitted.bytes_max as i64));
+    let report = pending.unwrap().report().clone();
+    let steps = Horizon::Steps { steps: 1 };
+    let predicted = measure(|| {
+        report.predictions(&log, steps, InitialCondition::Drop).unwrap();
+    });
+    assert!(
+        predicted.bytes_max as usize <= 32 * ROWS + 65_536,
+        "{} bytes a row",
+        predicted.bytes_max as usize / ROWS
+    );
 }

@@ -90,6 +90,41 @@ impl Report {
         applied(&self.model, log, rows, detrend, (horizon, initial), (&rows_of_fit(self, log)?, false))
     }
 
+    /// What [`apply`](Self::apply) predicts of each output in all rows of a log, without deviations, figures and rows
+    /// beyond its end: in 32 bytes a row, of which 16 are a copy of a log with an input, for an ARX model.
+    ///
+    /// # Errors
+    /// As for [`apply`].
+    pub fn predictions(
+        &self,
+        log: &Log,
+        horizon: Horizon,
+        initial: InitialCondition,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let Prepared { rows, log: deviations, levels } =
+            prepared(&self.model, log, &[], None, (horizon, initial))?;
+        let on_log = self.model.on_log(&deviations, &rows, Some(initial), &rows_of_fit(self, log)?)?;
+        let responses = on_log.respond_alone(horizon, initial)?;
+        let forecast = match horizon {
+            Horizon::FreeRun => None,
+            Horizon::Steps { steps } => on_log.forecast(&deviations, &rows, steps, initial)?,
+        };
+        let each = responses.into_iter().zip(&levels).enumerate().map(|(index, (response, level))| {
+            let mut predicted = response.values;
+            if let Some((first, ahead)) = &forecast {
+                let new = &ahead[index].values;
+                for (value, new) in predicted.iter_mut().skip(*first).zip(new) {
+                    *value = *new;
+                }
+            }
+            for (row, value) in predicted.iter_mut().enumerate() {
+                *value += level.at(log.elapsed(row));
+            }
+            predicted
+        });
+        Ok(each.collect())
+    }
+
     /// A free run of a nonlinear ARX model of which each output that is fed back is kept within 1.1 times the range of
     /// the estimation rows, about its middle: finite, if not good, where the free run leaves the data. `clamped` counts
     /// the values that were.

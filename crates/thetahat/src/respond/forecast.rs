@@ -99,7 +99,7 @@ pub(crate) fn forecast_if_possible(
         return forecast_if_possible(&model, &record.with_inputs(&past), &inputs, steps, start);
     }
     let (Some(segment), Some(past)) = (record.segments.last(), record.past.last()) else { return Ok(None) };
-    let found = of_segments(model, record, &[(segment.clone(), *past)], 1, start)?.pop();
+    let found = of_segments(model, record, &[(segment.clone(), *past)], 1, start, true)?.pop();
     let Some(found) = found else { return Ok(None) };
     let rows = found.rows.clone();
 

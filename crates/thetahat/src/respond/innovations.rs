@@ -116,10 +116,31 @@ pub(crate) fn innovations(
     horizon: usize,
     start: InitialCondition,
 ) -> Result<Vec<Innovations>, Error> {
+    of_record(model, record, horizon, start, true)
+}
+
+/// The same where only errors are needed: without the disturbances of models that need past outputs, as long as the
+/// errors. Of the others predictions through missing outputs need them.
+pub(super) fn errors_alone(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    horizon: usize,
+    start: InitialCondition,
+) -> Result<Vec<Innovations>, Error> {
+    of_record(model, record, horizon, start, !model.orders.needs_past_outputs())
+}
+
+fn of_record(
+    model: &PolynomialModel,
+    record: &Record<'_>,
+    horizon: usize,
+    start: InitialCondition,
+    disturbances: bool,
+) -> Result<Vec<Innovations>, Error> {
     check_inputs(model, record)?;
     let segments = record.segments.iter().zip(&record.past);
     let segments: Vec<_> = segments.map(|(segment, past)| (segment.clone(), *past)).collect();
-    of_segments(model, record, &segments, horizon, start)
+    of_segments(model, record, &segments, horizon, start, disturbances)
 }
 
 /// The same of some segments, each with the number of measured samples before it.
@@ -129,10 +150,13 @@ pub(super) fn of_segments(
     segments: &[(Range<usize>, usize)],
     horizon: usize,
     start: InitialCondition,
+    disturbances: bool,
 ) -> Result<Vec<Innovations>, Error> {
     let all = |with_inputs: bool| -> Result<Vec<Innovations>, Error> {
         let each = segments.iter().filter_map(|(segment, past)| {
-            of_segment(model, record, segment, *past, horizon, start, with_inputs).transpose()
+            let found =
+                of_segment(model, record, segment, *past, horizon, (start, with_inputs), disturbances);
+            found.transpose()
         });
         each.collect()
     };
@@ -172,8 +196,8 @@ fn of_segment(
     segment: &Range<usize>,
     past: usize,
     horizon: usize,
-    start: InitialCondition,
-    with_inputs: bool,
+    (start, with_inputs): (InitialCondition, bool),
+    disturbances: bool,
 ) -> Result<Option<Innovations>, Error> {
     let conditioned = model.orders.conditioned();
     let ahead = horizon.saturating_sub(1);
@@ -199,7 +223,7 @@ fn of_segment(
     let known = after.iter().map(Range::len).sum::<usize>();
     let mut impulses = Impulses::none(model);
     let mut basis = Basis { presample, first: 0, counts: vec![0; model.orders.inputs()], gaps: Vec::new() };
-    let (mut disturbance, mut errors) = residuals(model, record, &rows, presample, &impulses);
+    let (mut disturbance, mut errors) = residuals(model, record, &rows, presample, &impulses, disturbances);
     if start == InitialCondition::Estimate {
         // Numbers that as many samples determine fit them, whatever they are.
         let (_, origin) = estimated(model, past, with_inputs);
@@ -217,7 +241,7 @@ fn of_segment(
             let counts = (0..model.orders.inputs()).map(|input| count(model, input, origin, with_inputs));
             basis = Basis { presample, first: origin, counts: counts.collect(), gaps };
             impulses = best(model, &errors, &basis)?;
-            (disturbance, errors) = residuals(model, record, &rows, presample, &impulses);
+            (disturbance, errors) = residuals(model, record, &rows, presample, &impulses, disturbances);
         }
     }
     Ok(Some(Innovations { rows, presample, basis, span, counted, impulses, disturbance, errors, known }))
@@ -257,21 +281,23 @@ fn add(sum: &mut [f64], values: &[f64]) {
     sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
 }
 
-/// w and e over some rows, zeros before them. Where the output is missing, w = -x and e = 0.
+/// w and e over some rows, zeros before them. Where the output is missing, w = -x and e = 0. Without `disturbances` a
+/// model that needs past outputs has no w.
 pub(super) fn residuals(
     model: &PolynomialModel,
     record: &Record<'_>,
     rows: &Range<usize>,
     presample: usize,
     impulses: &Impulses,
+    disturbances: bool,
 ) -> (Vec<f64>, Vec<f64>) {
     let inputs: Vec<&[f64]> = record.inputs.iter().map(|u| &u[rows.clone()]).collect();
     let mut disturbance = driven(model, &inputs, rows.len(), impulses);
     disturbance.iter_mut().for_each(|value| *value = -*value);
     if model.orders.needs_past_outputs() {
         add_filtered(&mut disturbance, rows, &model.a, record.output, rows.start);
-        let errors = whitened(model, &disturbance, presample);
-        return (disturbance, errors);
+        let kept = if disturbances { disturbance.clone() } else { Vec::new() };
+        return (kept, whitened(model, disturbance, presample));
     }
     let mut errors = vec![0.0; rows.len()];
     for (t, y) in record.output[rows.clone()].iter().enumerate().filter(|(_, y)| !y.is_nan()) {
@@ -284,15 +310,16 @@ pub(super) fn residuals(
 }
 
 /// (1/C) of D w, of which the first samples are set to zero.
-fn whitened(model: &PolynomialModel, disturbance: &[f64], presample: usize) -> Vec<f64> {
+fn whitened(model: &PolynomialModel, disturbance: Vec<f64>, presample: usize) -> Vec<f64> {
+    let samples = disturbance.len();
     let mut errors = if model.d.len() == 1 {
-        disturbance.to_vec()
+        disturbance
     } else {
-        let mut errors = vec![0.0; disturbance.len()];
-        add_filtered(&mut errors, &(0..disturbance.len()), &model.d, disturbance, 0);
+        let mut errors = vec![0.0; samples];
+        add_filtered(&mut errors, &(0..samples), &model.d, &disturbance, 0);
         errors
     };
-    let (head, tail) = errors.split_at_mut(presample.min(disturbance.len()));
+    let (head, tail) = errors.split_at_mut(presample.min(samples));
     head.fill(0.0);
     divide(&model.c, tail);
     errors
@@ -337,12 +364,13 @@ pub(super) fn free_columns(model: &PolynomialModel, samples: usize, basis: &Basi
     let column = |response: &[f64], delay: usize| {
         let mut delayed = vec![0.0; (first + delay).min(length)];
         delayed.extend_from_slice(&response[..length - delayed.len()]);
-        let mut values = whitened(model, &delayed, presample);
+        let size = |values: &[f64]| values.iter().fold(0.0_f64, |size, value| size.hypot(*value));
+        let before = gain * size(&delayed);
+        let mut values = whitened(model, delayed, presample);
         for gap in gaps {
             values[gap.start.min(length)..gap.end.min(length)].fill(0.0);
         }
-        let size = |values: &[f64]| values.iter().fold(0.0_f64, |size, value| size.hypot(*value));
-        let rounding = UNDETERMINED * (gain * size(&delayed)).max(size(&values));
+        let rounding = UNDETERMINED * before.max(size(&values));
         Column { values, rounding }
     };
     let mut columns: Vec<Column> = Vec::new();

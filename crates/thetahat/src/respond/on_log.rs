@@ -31,6 +31,11 @@ pub(crate) trait OnLog: Sync {
     /// The responses, as such deviations.
     fn respond(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error>;
 
+    /// The same where nothing else is asked for: what deviations and tests would need is not kept.
+    fn respond_alone(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
+        self.respond(horizon, start)
+    }
+
     /// The standard deviations of the errors of predictions, including the uncertainty of the parameters; NaN where
     /// there is none.
     fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error>;
@@ -163,6 +168,13 @@ impl OnLog for PolynomialOnLog<'_> {
             Horizon::FreeRun => simulate(self.model, record, start)?,
         };
         Ok(vec![response])
+    }
+
+    fn respond_alone(&self, horizon: Horizon, start: InitialCondition) -> Result<Vec<Response>, Error> {
+        match horizon {
+            Horizon::Steps { steps } => Ok(vec![predict(self.model, &self.ahead, steps, start)?]),
+            Horizon::FreeRun => self.respond(horizon, start),
+        }
     }
 
     fn deviations(&self, steps: usize, start: InitialCondition) -> Result<Vec<Vec<f64>>, Error> {

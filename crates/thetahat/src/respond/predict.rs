@@ -3,7 +3,7 @@ use std::ops::Range;
 use thetahat_numerics::regression::{add_filtered, divide};
 
 use super::initial_responses::until_negligible;
-use super::innovations::{Innovations, innovations};
+use super::innovations::{Innovations, errors_alone};
 use super::{InitialCondition, Response, check_inputs};
 use crate::Error;
 use crate::data::Record;
@@ -78,7 +78,7 @@ pub fn predict(
     check_start(model, start)?;
     // Farther than from before the first sample to the last there is nothing to look from.
     let horizon = horizon.min(longest(record) + 1);
-    Ok(predicted(model, record, horizon, &innovations(model, record, horizon, start)?))
+    Ok(predicted(model, record, horizon, &errors_alone(model, record, horizon, start)?))
 }
 
 /// The prediction that follows from the innovations of those samples that have one so many steps ahead.

@@ -93,7 +93,7 @@ pub fn simulate(
         if start == InitialCondition::Drop {
             let before = first..run.start;
             let (disturbance, errors) =
-                residuals(model, record, &before, conditioned, &Impulses::none(model));
+                residuals(model, record, &before, conditioned, &Impulses::none(model), true);
             let output = &record.output[before];
             continuation(model, &Known { output, disturbance: &disturbance, errors: &errors }, &mut values);
         } else {

@@ -125,7 +125,7 @@ class Model(ConvertibleModel, KnownModels):
         >>> model.predict(log).shape
         (1000,)
         """
-        return self._predicted(log, horizon, initial)[0]
+        return _beside(self._model.predict(*self._asked(log, horizon, initial)))
 
     def predict_interval(
         self, log: Log | Frame, horizon: int | None = 1, *, level: float = 0.95, initial: str = "auto"
@@ -147,19 +147,20 @@ class Model(ConvertibleModel, KnownModels):
             The lower and the upper end; NaN where there is none.
         """
         quantile = _options.quantile(level)
-        values, deviations = self._predicted(log, horizon, initial)
-        half = quantile * (np.nan if deviations is None else deviations)
+        found = self._model.predict_with_deviations(*self._asked(log, horizon, initial))
+        values = _beside([values for values, _ in found])
+        known = [deviations for _, deviations in found if deviations is not None]
+        half = quantile * (_beside(known) if known else np.nan)
         return np.stack([values - half, values + half], axis=-1)
 
-    def _predicted(self, log: Log | Frame, horizon: int | None, initial: str) -> tuple[Array, Array | None]:
+    def _asked(self, log: Log | Frame, horizon: int | None, initial: str) -> tuple[_thetahat.Log, int | None, str]:
+        """What a prediction is of, how far ahead, and from where."""
         if horizon is not None:
             horizon = _options.count("horizon", horizon, 1_000_000)
         data = self._log_of(log, horizon is None)
-        if horizon is None and initial == "auto" and all(np.isnan(data[output]).all() for output in self.outputs):
+        if horizon is None and initial == "auto" and all(data.missing[output] == len(data) for output in self.outputs if output in data):
             initial = "zero"
-        found = self._model.predict(data._log, horizon, initial)
-        deviations = [deviations for _, deviations in found if deviations is not None]
-        return _beside([values for values, _ in found]), _beside(deviations) if deviations else None
+        return data._log, horizon, initial
 
     def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto", clamp: bool = False) -> Array:
         """The free run on inputs, in the units of the log.
@@ -195,7 +196,7 @@ class Model(ConvertibleModel, KnownModels):
         """
         if isinstance(u, Log):
             if not clamp:
-                return self._predicted(u, None, initial)[0]
+                return self.predict(u, None, initial=initial)
             values, kept = self._model.clamped_run(handle("u", u), None, initial)
         elif initial not in ("auto", "zero"):
             raise ValueError(f"initial: inputs alone start from zero, not '{initial}'; give a Log to start from its output")

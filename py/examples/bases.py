@@ -36,7 +36,7 @@ def samples(dimensions: int, rows: int, seed: int) -> th.Log:
     return th.Log(np.tanh(4 * s) + 0.5 * np.exp(-4 * s**2), x, sample_time=1)
 
 
-def error(known: th.Log, fresh: th.Log, basis: str, **options: Any) -> tuple[int, float]:
+def error(known: th.Log, fresh: th.Log, basis: Any, **options: Any) -> tuple[int, float]:
     """The number of parameters of a fit, and its root mean square error on fresh samples, relative to the deviation of g."""
     dimensions = len(known.inputs)
     model = th.narx(known, basis, ny=0, nu=[1] * dimensions, nk=[0] * dimensions, detrend="none", **options)

@@ -47,4 +47,4 @@ def test_findings_name_channels_and_rows() -> None:
 
 def test_a_map_that_is_none_is_refused_where_one_is_asked_for() -> None:
     with pytest.raises(ValueError, match="narx"):
-        th.narx(_loop(), "none")
+        th.narx(_loop(), "none")  # type: ignore[arg-type]

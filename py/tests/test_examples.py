@@ -16,7 +16,7 @@ EXAMPLES = sorted(Path(__file__).parents[1].joinpath("examples").glob("*.py"))
 
 
 def test_there_are_examples() -> None:
-    assert [path.stem for path in EXAMPLES] == ["bases", "battery_ekf", "first_model", "order_study", "oscillator", "two_outputs", "two_tanks"]
+    assert [path.stem for path in EXAMPLES] == ["at_home", "bases", "battery_ekf", "first_model", "order_study", "oscillator", "two_outputs", "two_tanks"]
 
 
 # What a fit warns of is part of the story.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from pathlib import Path
 from shutil import which
+from typing import Any
 
 import pytest
 
@@ -22,7 +23,7 @@ def test_files_are_those_of_the_command_line(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(which("gcc") is None, reason="gcc is missing")
 @pytest.mark.parametrize("precision", ["f32", "f64"])
-def test_what_is_compiled_says_what_the_model_does(tmp_path: Path, precision: str) -> None:
+def test_what_is_compiled_says_what_the_model_does(tmp_path: Path, precision: Any) -> None:
     log = th.dc_motor()
     files = th.bj(log, nb=2, nc=1, nd=1, nf=2).export("c", "predictor", log, precision=precision, name="motor", folder=tmp_path)
     assert list(files) == ["motor.h", "motor.c", "motor.csv", "motor_test.c"]
@@ -39,7 +40,7 @@ def test_what_cannot_be_exported_is_refused() -> None:
         (("c", "oracle"), "what: 'oracle' is none"),
     ]:
         with pytest.raises(ValueError, match=said):
-            model.export(*words)
+            model.export(*words)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="name"):
         model.export("c", "predictor", name="Motor 1")
     with pytest.raises(TypeError, match="what"):

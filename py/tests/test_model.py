@@ -54,7 +54,7 @@ def test_what_stands_before_a_log_has_one_set_of_words(motor: th.Log) -> None:
     assert np.isnan(dropped[:2]).all() and np.isfinite(started).all()
     assert [fit["initial"] for fit in arx.fits] == ["drop", "estimate"]
     with pytest.raises(ValueError, match="initial: 'measured' is none of 'auto', 'drop', 'zero', 'estimate'"):
-        model.predict(motor, initial="measured")
+        model.predict(motor, initial="measured")  # type: ignore[arg-type]
 
 
 def test_information_criteria_are_those_of_statsmodels() -> None:
@@ -306,7 +306,7 @@ def test_what_a_model_cannot_answer_is_refused(motor: th.Log) -> None:
         (lambda: model.predict(th.Log(motor.y, motor.u, sample_time=0.02)), "sample time"),
         (lambda: model.predict(motor, 0), "horizon: 0 is outside"),
         (lambda: model.predict(motor, 10**30), "horizon"),
-        (lambda: model.predict(motor, 1, initial="cold"), "initial: 'cold'"),
+        (lambda: model.predict(motor, 1, initial="cold"), "initial: 'cold'"),  # type: ignore[arg-type]
         (lambda: model.simulate([]), "u: "),
         (lambda: model.simulate(np.ones((5, 3))), r"u: expected shape \(any, 1\)"),
         (lambda: model.simulate([1.0, np.nan]), "u: input 'u' holds NaN"),

@@ -117,7 +117,7 @@ def test_bad_arguments_are_told(options: dict[str, object], message: str) -> Non
         (lambda y: y[:3], th.EstimationError, "too few rows for the lags"),
     ],
 )
-def test_bad_logs_are_told(map: str, change: Callable[[Any], Any], error: type[Exception], message: str) -> None:
+def test_bad_logs_are_told(map: Any, change: Callable[[Any], Any], error: type[Exception], message: str) -> None:
     good = log(50)
     y = change(np.asarray(good["y"]))
     with pytest.raises(error, match=message):
@@ -150,7 +150,7 @@ def test_splines_are_a_map_too() -> None:
         ("knn", {"units": 8}, "neighbours"),
     ],
 )
-def test_local_models_and_neighbours_are_maps_too(map: str, options: dict[str, object], kind: str) -> None:
+def test_local_models_and_neighbours_are_maps_too(map: Any, options: dict[str, object], kind: str) -> None:
     data = log(600)
     model = th.narx(data, map, ny=1, nu=1, **options)  # type: ignore[arg-type]
     assert document(model)["model"]["maps"][0]["functions"]["type"] == kind
@@ -260,7 +260,7 @@ def free_run(model: th.Model, data: th.Log) -> float:
 
 
 @pytest.mark.parametrize("map", ["tanh", "logistic", "relu", "rbf-free"])
-def test_trained_maps_run_better_than_a_line(map: str) -> None:
+def test_trained_maps_run_better_than_a_line(map: Any) -> None:
     data = saturating()
     line = free_run(th.narx(data[:500], degree=1, terms=4), data[500:])
     model = th.narx(data[:500], map, units=3, ridge=0.01, starts=2)

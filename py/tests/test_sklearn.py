@@ -331,7 +331,7 @@ def test_nonlinear_models_are_regressors_too() -> None:
     series = NARXRegressor(ny=2, horizon=1).fit(None, y)
     assert series.n_features_in_ == 0
     with pytest.raises(ValueError, match="map|narx"):
-        NARXRegressor(map="cubic").fit(u, y)
+        NARXRegressor(map="cubic").fit(u, y)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="horizon"):
         NARXRegressor(horizon=0).fit(u, y)
 

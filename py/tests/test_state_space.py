@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+from typing import Any
 from collections.abc import Callable
 
 import numpy as np
@@ -207,7 +208,8 @@ def test_continuous_time_is_that_of_scipy() -> None:
     data = log()
     model = th.ss(data, 2)
     form = model.to_state_space()
-    for hold, method in (("zoh", "zoh"), ("foh", "foh"), ("tustin", "bilinear")):
+    holds: list[tuple[Any, str]] = [("zoh", "zoh"), ("foh", "foh"), ("tustin", "bilinear")]
+    for hold, method in holds:
         continuous = model.converted("continuous", hold)
         assert continuous.kind == "continuous-state-space" and continuous.stable
         plant = continuous.to_scipy()
@@ -230,6 +232,6 @@ def test_continuous_time_is_that_of_scipy() -> None:
     with pytest.raises(ValueError, match="neither the word continuous"):
         model.converted("slow")
     with pytest.raises(ValueError, match="is none of zoh, foh and tustin"):
-        model.converted(1.0, "ramp")
+        model.converted(1.0, "ramp")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="has a dead time"):
         th.ss(data, 2, nk=3).converted("continuous").to_scipy()

@@ -1,22 +1,30 @@
 """System identification: models of dynamic systems from logged data.
 
-A log holds measured signals (`Log`, `read_log`, `read_csv`; `topics` lists those of a flight). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
-`NormalEquations` make one model from many pieces of a log that is larger than memory.
-`thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
-
-Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
-channel also a column. What is None, NaN, NA, null or masked is missing.
-
-Estimators that run with the process take a sample at a time, or a whole array: `RecursiveLeastSquares`, `RecursiveArx`,
-`RecursiveArmax`, `RecursiveOutputError`, `RecursiveNarx`, `WindowedLeastSquares`, `KalmanFilter`, `ExtendedKalmanFilter`, `OutOfSequenceFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations. A `StateFilter` is a filter of a
-fitted or written model and a `Tracker` a recursive model with the channels and offsets of a log, its gaps and its documents.
-
 >>> import thetahat as th
 >>> log = th.dc_motor()
 >>> model = th.search(log[:700])
 >>> model
 Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
+
+Logs            `Log`, `read_log`, `read_csv`, `topics` of the log of a flight, `inspect` before a fit.
+Fits            `fit` takes the model that the data ask for, `search` chooses among orders, `fit_many` does it with many logs.
+  polynomials   `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
+  others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations.
+Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
+                `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
+                `compare` lays several side by side.
+Experiments     `design` makes test signals, `spectrum` finds a frequency response, `step_test` what steps show.
+Controllers     `tune` for processes; `lqr`, `pole_placement`, `minimum_variance`, run by `closed_loop`;
+                `RstController`, `SelfTuner`.
+Row by row      `update(y, u)` and `predict(u)`, or `run` for whole arrays:
+  models        `Tracker` with channels and documents; `RecursiveArx`, `RecursiveVectorArx`, `RecursiveArmax`,
+                `RecursiveOutputError`, `RecursiveNarx`, `RecursiveLeastSquares`, `WindowedLeastSquares`.
+  states        `StateFilter` of a model, a `StateModel` or a `GreyBox`; `KalmanFilter`, `ExtendedKalmanFilter`,
+                `OutOfSequenceFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations.
+Modules         `thetahat.plot` draws, `thetahat.sklearn` fits into scikit-learn, `thetahat.dask` fits to data on many machines.
+
+Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
+channel also a column. What is None, NaN, NA, null or masked is missing. `help(th.arx)` and its like say more.
 """
 
 from importlib import import_module
@@ -56,6 +64,7 @@ from thetahat._thetahat import (
 from thetahat.base.said import EstimationWarning
 from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat.controllers.tune import Tuning, tune
+from thetahat.engine import signatures as _signatures
 from thetahat.engine.option_types import (
     DesignOptions,
     EquationsOptions,
@@ -199,6 +208,8 @@ __all__ = [
     "topics",
     "tune",
 ]
+
+_signatures.spell_out(globals()[name] for name in __all__)
 
 _LATER = ("dask", "plot", "sklearn")
 """Modules that load when they are first asked for: each needs a package that not everybody has."""

@@ -8,7 +8,7 @@ numbers it counts rows; nothing reaches across what is left out of either, and r
 from __future__ import annotations
 
 import numbers
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.ma as ma
@@ -28,7 +28,7 @@ except ImportError as error:
 from thetahat.base import clock as _clock, numbers as _numbers
 from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import arx
-from thetahat.fits.narx import narx
+from thetahat.fits.narx import Map, narx
 from thetahat.fits.state_space import ss
 from thetahat.logs.log import Log
 from thetahat.models.model import Model
@@ -414,17 +414,17 @@ class ARXRegressor(_Regressor):
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
         prefilter: Band | None = None,
-        initial: str | None = None,
-        likelihood: str | None = None,
-        constant: str | None = None,
+        initial: Literal["auto", "drop", "zero", "estimate"] | None = None,
+        likelihood: Literal["conditional", "exact"] | None = None,
+        constant: Literal["auto", "yes", "no"] | None = None,
         trend: bool | None = None,
-        focus: str | int | None = None,
+        focus: int | Literal["auto", "prediction", "simulation"] | None = None,
         norm: float | str | None = None,
         bound: Mapping[str, Bound] | None = None,
         dc_gain: Bound | Mapping[str, Bound] | None = None,
         ridge: float | None = None,
         noise_bound: float | None = None,
-        search: str | None = None,
+        search: Literal["lm", "gauss-newton", "newton", "gradient", "annealing"] | None = None,
         max_iterations: int | None = None,
         tolerance: float | None = None,
         step: float | tuple[float, float] | None = None,
@@ -521,7 +521,7 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
 
     def __init__(
         self,
-        map: str = "poly",
+        map: Map = "poly",
         ny: int = 2,
         nu: int | Sequence[int] = 2,
         nk: int | Sequence[int] = 1,
@@ -536,13 +536,13 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         width: float | None = None,
         units: int | None = None,
         linear: bool | None = None,
-        membership: str | None = None,
-        select: str | None = None,
+        membership: Literal["rectangle", "trapezoid", "gaussian"] | None = None,
+        select: Literal["fpe", "aic", "aicc", "mdl", "hqc", "validation", "cv"] | None = None,
         ridge: float | None = None,
         raw_terms: bool | None = None,
         drawn: bool | None = None,
-        focus: str | int | None = None,
-        search: str | None = None,
+        focus: int | Literal["auto", "prediction", "simulation"] | None = None,
+        search: Literal["lm", "gauss-newton", "newton", "gradient", "annealing"] | None = None,
         max_iterations: int | None = None,
         tolerance: float | None = None,
         step: float | tuple[float, float] | None = None,
@@ -647,12 +647,12 @@ constant : default=None
         *,
         horizon: int | None = None,
         sample_time: float | None = None,
-        weighting: str | None = None,
+        weighting: Literal["ssarx", "moesp", "n4sid", "cva"] | None = None,
         past: int | None = None,
         future: int | None = None,
         feedthrough: bool | None = None,
-        refine: str | None = None,
-        search: str | None = None,
+        refine: Literal["prediction", "simulation"] | None = None,
+        search: Literal["lm", "gauss-newton", "newton", "gradient", "annealing"] | None = None,
         max_iterations: int | None = None,
         tolerance: float | None = None,
         time_limit: float | None = None,
@@ -661,7 +661,7 @@ constant : default=None
         split: tuple[float, float, float] | None = None,
         detrend: str | None = None,
         offset: Mapping[str, float] | None = None,
-        constant: str | None = None,
+        constant: Literal["auto", "yes", "no"] | None = None,
     ) -> None:
         self.order = order
         self.nk = nk

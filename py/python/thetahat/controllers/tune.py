@@ -35,12 +35,12 @@ class Tuning(Document):
     [5.0, 8.0, 0.0]
     """
 
-    def settings(self, rule: str = "simc", controller: str = "pi") -> tuple[float, float, float]:
+    def settings(self, rule: Literal["simc", "lambda"] = "simc", controller: Literal["pi", "pid"] = "pi") -> tuple[float, float, float]:
         """Kc, Ti [s] and Td [s] by "simc" or "lambda", of a "pi" or a "pid"."""
         own = self._own(rule, controller)
         return float(own["gain"]), float(own["integral_time"]), float(own["derivative_time"])
 
-    def closed_loop(self, rule: str = "simc", controller: str = "pi") -> dict[str, Any]:
+    def closed_loop(self, rule: Literal["simc", "lambda"] = "simc", controller: Literal["pi", "pid"] = "pi") -> dict[str, Any]:
         """What the loop does: figures, and the responses as arrays of ``time``."""
         found = dict(self._own(rule, controller)["closed_loop"])
         for name in ("time", "setpoint_response", "controller_output", "load_response"):

@@ -18,7 +18,7 @@ from typing import Any, Callable, Literal, Optional, TypedDict, TypeVar, Union, 
 
 import numpy as np
 
-from thetahat.engine import files as _files
+from thetahat.engine import files as _files, signatures as _signatures
 from thetahat.engine.values import Duration, Resample
 
 
@@ -168,7 +168,12 @@ def takes(options: type | None = None) -> Callable[[_F], _F]:
 
     def documented(function: _F) -> _F:
         signature = inspect.signature(function)
-        own = [one for one in signature.parameters.values() if one.kind is not inspect.Parameter.VAR_KEYWORD]
+        names = function.__globals__
+        own = [
+            one.replace(annotation=_signatures.spelled_out(one.annotation, names))
+            for one in signature.parameters.values()
+            if one.kind is not inspect.Parameter.VAR_KEYWORD
+        ]
         added = [
             inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
             for name, kind in types.items()
@@ -184,7 +189,8 @@ def takes(options: type | None = None) -> Callable[[_F], _F]:
                     raise TypeError(f"{function.__name__}() has no argument {name!r}{meant}")
             return function(*arguments, **named)
 
-        own_types = {name: kind for name, kind in function.__annotations__.items() if name != "options"}
+        kinds = function.__annotations__.items()
+        own_types = {name: _signatures.spelled_out(kind, names) for name, kind in kinds if name != "options"}
         checked.__annotations__ = {**own_types, **types}
         checked.__signature__ = known  # type: ignore[attr-defined]
         return cast(_F, checked)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Sequence
-from typing import Optional, Union
+from typing import Literal, Optional, Union
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,17 @@ Rows = Union[str, slice, range, Sequence[Union[str, slice, range]]]
 Bound = Union[float, tuple[Optional[float], Optional[float]]]
 """A value, or the lower and the upper end of a range, either of which may be None."""
 
-Duration = Union[float, datetime.timedelta, "np.timedelta64", str]
+Duration = Union[float, datetime.timedelta, np.timedelta64, str]
 """Seconds, a timedelta of Python, NumPy or pandas, or a text such as ``"10 ms"``, in ns, us, ms, s, min, h or d."""
 
-Resample = Union["tuple[Duration, str]", "tuple[Duration, str, str]"]
+Initial = Literal["auto", "drop", "zero", "estimate"]
+"""What a response begins with: measured samples, zeros, or an estimate."""
+
+Resample = Union[tuple[Duration, str], tuple[Duration, str, str]]
 """The time between the new rows, "linear", "hold" or "auto", and "unfiltered" where no filter is wanted."""
 
-Band = Union["tuple[float | None, float | None]", str]
+Band = Union[tuple[Optional[float], Optional[float]], str]
 """The lower and the upper end in Hz, either of which may be None; or a text such as "0.1..5"."""
 
-Frequencies = Union["tuple[float, float]", Sequence[float], NDArray[np.float64]]
+Frequencies = Union[tuple[float, float], Sequence[float], NDArray[np.float64]]
 """A band in radians per second as a tuple of its ends, or a list of frequencies."""

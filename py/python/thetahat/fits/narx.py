@@ -24,7 +24,7 @@ Map = Literal["poly", "rbf", "spline", "local", "knn", "tanh", "logistic", "relu
 @_options.takes(NarxOptions)
 def narx(
     log: Log,
-    map: Map | str = "poly",
+    map: Map = "poly",
     *,
     ny: Lags | None = None,
     nu: Lags | None = None,
@@ -85,6 +85,6 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
     >>> sorted(model.parameter_names)
     ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
     """
-    if map == "none":
+    if map == "none":  # type: ignore[comparison-overlap]
         raise ValueError("map: narx fits a nonlinear model; name its functions, or fit a linear one")
     return fitted(log, {"narx": map, "ny": ny, "nu": nu, "nk": nk}, options)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -84,7 +84,7 @@ class ConvertibleModel(ReportedModel):
         """
         return self._of(self._model.reduced(_options.count("order", order)))
 
-    def converted(self, to: float | str, hold: str | None = None) -> Self:
+    def converted(self, to: float | str, hold: Literal["zoh", "foh", "tustin"] | None = None) -> Self:
         """The model in continuous time, or at another sample time.
 
         Of polynomials, in state space and of processes; the result is in state space. A model in continuous time goes with a log of any sample
@@ -127,11 +127,11 @@ class ConvertibleModel(ReportedModel):
 
     def export(
         self,
-        to: str,
-        what: str,
+        to: Literal["c", "rust"],
+        what: Literal["predictor", "simulator", "observer", "recursive", "controller"],
         log: Any = None,
         *,
-        precision: str = "f32",
+        precision: Literal["f32", "f64"] = "f32",
         name: str | None = None,
         folder: str | os.PathLike[str] | None = None,
     ) -> dict[str, str]:

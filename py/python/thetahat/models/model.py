@@ -17,6 +17,7 @@ from thetahat.base.frames import Frame
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import ValidationOptions
+from thetahat.engine.values import Initial
 from thetahat.logs.log import Log, handle
 from thetahat.models.forms import ConvertibleModel
 from thetahat.models.known import KnownModels
@@ -91,7 +92,7 @@ class Model(ConvertibleModel, KnownModels):
         """
         _thetahat.write(_files.name(path), self._model.page(None if log is None else handle("log", log), "thetahat.Model.write_html"))
 
-    def predict(self, log: Log | Frame, horizon: int | None = 1, *, initial: str = "auto") -> Array:
+    def predict(self, log: Log | Frame, horizon: int | None = 1, *, initial: Initial = "auto") -> Array:
         """The prediction of each row from what was known some steps before, in the units of the log.
 
         Parameters
@@ -128,7 +129,7 @@ class Model(ConvertibleModel, KnownModels):
         return _beside(self._model.predict(*self._asked(log, horizon, initial)))
 
     def predict_interval(
-        self, log: Log | Frame, horizon: int | None = 1, *, level: float = 0.95, initial: str = "auto"
+        self, log: Log | Frame, horizon: int | None = 1, *, level: float = 0.95, initial: Initial = "auto"
     ) -> Array:
         """Intervals that hold the output, as far as one knows some steps before.
 
@@ -153,7 +154,7 @@ class Model(ConvertibleModel, KnownModels):
         half = quantile * (_beside(known) if known else np.nan)
         return np.stack([values - half, values + half], axis=-1)
 
-    def _asked(self, log: Log | Frame, horizon: int | None, initial: str) -> tuple[_thetahat.Log, int | None, str]:
+    def _asked(self, log: Log | Frame, horizon: int | None, initial: Initial) -> tuple[_thetahat.Log, int | None, Initial]:
         """What a prediction is of, how far ahead, and from where."""
         if horizon is not None:
             horizon = _options.count("horizon", horizon, 1_000_000)
@@ -162,7 +163,7 @@ class Model(ConvertibleModel, KnownModels):
             initial = "zero"
         return data._log, horizon, initial
 
-    def simulate(self, u: _numbers.Columns | Log, *, initial: str = "auto", clamp: bool = False) -> Array:
+    def simulate(self, u: _numbers.Columns | Log, *, initial: Initial = "auto", clamp: bool = False) -> Array:
         """The free run on inputs, in the units of the log.
 
         Parameters
@@ -210,7 +211,7 @@ class Model(ConvertibleModel, KnownModels):
         return _beside(values)
 
     def sample(
-        self, u: _numbers.Columns | Log, draws: int = 100, *, seed: int = 0, initial: str = "auto"
+        self, u: _numbers.Columns | Log, draws: int = 100, *, seed: int = 0, initial: Initial = "auto"
     ) -> Array:
         """Free runs drawn from what the estimate leaves open: its noise, and its parameters within their covariance.
 
@@ -270,7 +271,7 @@ class Model(ConvertibleModel, KnownModels):
         return runs
 
     def forecast(
-        self, log: Log | Frame, steps: int, u: _numbers.Columns | None = None, *, initial: str = "auto"
+        self, log: Log | Frame, steps: int, u: _numbers.Columns | None = None, *, initial: Initial = "auto"
     ) -> Forecast:
         """What comes after the end of a log.
 
@@ -313,7 +314,7 @@ class Model(ConvertibleModel, KnownModels):
         time = log.time[-1] + self.sample_time * np.arange(1, steps + 1)
         return Forecast(time, values, deviations, log._clock.after(steps, self.sample_time), self.outputs)
 
-    def residuals(self, log: Log | Frame, horizon: int = 1, *, initial: str = "auto") -> Array:
+    def residuals(self, log: Log | Frame, horizon: int = 1, *, initial: Initial = "auto") -> Array:
         """The measured output less its prediction.
 
         Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ from thetahat import _thetahat
 from thetahat.base import clock as _clock, numbers as _numbers, picture as _picture
 from thetahat.base.said import deprecated
 from thetahat.engine import files as _files, options as _options
-from thetahat.engine.values import Duration
+from thetahat.engine.values import Duration, Initial
 from thetahat.fits.grey_box import GreyBox
 from thetahat.logs.log import Log
 from thetahat.models.model import Model
@@ -274,9 +274,9 @@ class StateFilter:
     def __init__(
         self,
         model: Model | StateModel | GreyBox,
-        estimator: str | None = None,
+        estimator: Literal["kalman", "ekf", "luenberger"] | None = None,
         *,
-        initial: str | None = None,
+        initial: Initial | None = None,
         measurement_noise: npt.ArrayLike | None = None,
         poles: npt.ArrayLike | None = None,
         gain: npt.ArrayLike | None = None,

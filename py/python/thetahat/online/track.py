@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -141,17 +141,17 @@ class Tracker:
         nk: int | Sequence[int] | None = None,
         *,
         warm: Model | None = None,
-        narx: str | None = None,
+        narx: Literal["poly"] | None = None,
         ny: int | None = None,
         nu: int | Sequence[int] | None = None,
         degree: int | None = None,
         inputs: Sequence[str] | str | None = None,
         output: str | Sequence[str] | None = None,
-        couple: str | None = None,
+        couple: Literal["full", "none"] | None = None,
         offset: Mapping[str, float] | None = None,
         scale: Mapping[str, float] | None = None,
         constant: bool = False,
-        method: str | None = None,
+        method: Literal["rls", "els", "rpem"] | None = None,
         forgetting: Policy | Sequence[Policy] = 0.99,
         start: str | None = None,
         dead_zone: float | None = None,

@@ -98,11 +98,11 @@ impl Searching {
         if !TAKEN.load(Ordering::Relaxed)
             && let Some(bar) = self.0.due(make)
         {
-            bar.set_message(format!(
-                "iteration {}, cost {}",
-                progress.iteration,
-                scientific(progress.cost, 6)
-            ));
+            let cost = scientific(progress.cost, 6);
+            bar.set_message(match progress.models {
+                Some((done, all)) => format!("{done} of {all} models, cost {cost}"),
+                None => format!("iteration {}, cost {cost}", progress.iteration),
+            });
         }
     }
 }

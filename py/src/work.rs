@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use thetahat::Error;
-use thetahat::optimize::Monitor;
+use thetahat::optimize::{Monitor, Progress};
 
 use crate::error;
 
@@ -48,6 +48,33 @@ thread_local! {
     static THREADS: Cell<usize> = const { Cell::new(0) };
     /// What ends the calls of this thread, which no signal reaches where it is not the main one.
     static STOP: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+    /// What is told of the progress of the calls of this thread.
+    static TOLD: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
+}
+
+/// Where work is: how many models or iterations are done, of how many, and the least cost so far.
+#[derive(Clone, Copy, PartialEq)]
+struct Place {
+    done: usize,
+    total: Option<usize>,
+    best: f64,
+}
+
+/// Where work is, written where it is done, read where it is waited for.
+#[derive(Default)]
+struct Watch(Mutex<Option<Place>>);
+
+impl Watch {
+    fn note(&self, now: Progress) {
+        let mut place = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let best = place.map_or(f64::INFINITY, |before| before.best).min(now.cost);
+        let (done, total) = now.models.map_or((now.iteration, None), |(done, all)| (done, Some(all)));
+        *place = Some(Place { done, total, best });
+    }
+
+    fn place(&self) -> Option<Place> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// Ends the long work of the threads that have it, see [`threads`], within some tens of milliseconds.
@@ -101,18 +128,39 @@ fn awaited_on<T: Send + 'static>(
     let asked = Arc::new(AtomicBool::new(false));
     let (sender, receiver) = sync_channel::<Result<T, Box<dyn Any + Send>>>(1);
     let stop = Arc::clone(&asked);
+    let told = TOLD.with_borrow(|told| told.as_ref().map(|told| told.clone_ref(py)));
+    let watch = told.as_ref().map(|_| Arc::<Watch>::default());
+    let noted = watch.clone();
     pool.spawn(move || {
-        let monitor =
-            |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let monitor = |now: Progress| {
+            if let Some(watch) = &noted {
+                watch.note(now);
+            }
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
         // Nobody listens after Ctrl-C.
         let _ = sender.send(catch_unwind(AssertUnwindSafe(|| work(&monitor))));
     });
+    let mut last = None;
+    let mut tell = || {
+        let (Some(told), Some(watch)) = (&told, &watch) else { return Ok(()) };
+        let now = watch.place();
+        if now == last {
+            return Ok(());
+        }
+        last = now;
+        let Some(Place { done, total, best }) = now else { return Ok(()) };
+        Python::attach(|py| told.call1(py, (done, total, best.is_finite().then_some(best))).map(|_| ()))
+    };
     let ended = py.detach(move || {
         loop {
             match receiver.recv_timeout(PATIENCE) {
-                Ok(result) => return Ok(Some(result)),
+                Ok(result) => {
+                    tell()?;
+                    return Ok(Some(result));
+                }
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),
-                Err(RecvTimeoutError::Timeout) => signals()?,
+                Err(RecvTimeoutError::Timeout) => signals().and_then(|()| tell())?,
             }
         }
     });
@@ -169,6 +217,14 @@ fn known() -> MutexGuard<'static, Pools> {
 #[pyo3(signature = (count, stop))]
 fn threads(count: usize, stop: Option<&Bound<'_, Stop>>) -> (usize, Option<Stop>) {
     (THREADS.replace(count), STOP.replace(stop.map(|stop| Arc::clone(&stop.get().0))).map(Stop))
+}
+
+/// Has the calls of this thread tell this function of their progress, with how many models or iterations are done, of
+/// how many, and the least cost so far; None for no function. Gives what was before, to be given back.
+#[pyfunction]
+#[pyo3(signature = (told))]
+fn progress(told: Option<Py<PyAny>>) -> Option<Py<PyAny>> {
+    TOLD.replace(told)
 }
 
 /// What Python's handlers of the signals since the last time raise.
@@ -230,6 +286,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let _ = HERE.set(thread::current().id());
     module.add_class::<Stop>()?;
     module.add_function(wrap_pyfunction!(threads, module)?)?;
+    module.add_function(wrap_pyfunction!(progress, module)?)?;
     py.import("atexit")?.call_method1("register", (wrap_pyfunction!(end, module)?,))?;
     let os = py.import("os")?;
     if os.hasattr("register_at_fork")? {

@@ -21,6 +21,7 @@ Row by row      `update(y, u)` and `predict(u)`, or `run` for whole arrays:
                 `RecursiveOutputError`, `RecursiveNarx`, `RecursiveLeastSquares`, `WindowedLeastSquares`.
   states        `StateFilter` of a model, a `StateModel` or a `GreyBox`; `KalmanFilter`, `ExtendedKalmanFilter`,
                 `OutOfSequenceFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations.
+Warnings        `warnings_as` raises, logs or silences them; the logger is ``"thetahat"``.
 Modules         `thetahat.plot` draws, `thetahat.sklearn` fits into scikit-learn, `thetahat.dask` fits to data on many machines.
 
 Whatever takes numbers takes arrays of NumPy, lists and tuples, and the series and frames of pandas, Polars and PyArrow; of one
@@ -61,7 +62,7 @@ from thetahat._thetahat import (
     WindowedLeastSquares,
     __version__,
 )
-from thetahat.base.said import EstimationWarning
+from thetahat.base.said import EstimationWarning, warnings_as
 from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat.controllers.tune import Tuning, tune
 from thetahat.engine import signatures as _signatures
@@ -207,6 +208,7 @@ __all__ = [
     "tf",
     "topics",
     "tune",
+    "warnings_as",
 ]
 
 _signatures.spell_out(globals()[name] for name in __all__)

@@ -8,14 +8,16 @@ numbers it counts rows; nothing reaches across what is left out of either, and r
 from __future__ import annotations
 
 import numbers
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
 import numpy.ma as ma
+from narwhals.dependencies import is_pandas_like_dataframe, is_pandas_like_series
 
 try:
     from sklearn.base import BaseEstimator, RegressorMixin
-    from sklearn.metrics import r2_score
+    from sklearn.metrics import get_scorer, r2_score
     from sklearn.utils import check_array, check_consistent_length, column_or_1d
     from sklearn.utils.validation import check_is_fitted, validate_data
 except ImportError as error:
@@ -25,7 +27,9 @@ except ImportError as error:
     )
     raise ImportError(message) from error
 
-from thetahat.base import clock as _clock, numbers as _numbers
+from thetahat._thetahat import EstimationError
+from thetahat.base import clock as _clock, numbers as _numbers, said as _said
+from thetahat.base.said import EstimationWarning
 from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import arx
 from thetahat.fits.narx import Map, narx
@@ -34,25 +38,59 @@ from thetahat.logs.log import Log
 from thetahat.models.model import Model
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import ArrayLike, NDArray
     from typing_extensions import Self
 
     from thetahat.engine.values import Band, Bound, Rows
 
-__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor", "StateSpaceRegressor"]
+__all__ = ["EXPECTED_FAILED_CHECKS", "ARXRegressor", "NARXRegressor", "StateSpaceRegressor", "scorer"]
 
 EXPECTED_FAILED_CHECKS = {
     "check_methods_sample_order_invariance": "rows are in the order of time",
     "check_methods_subset_invariance": "a row depends on those before it",
-    "check_regressors_no_decision_function": "its 10 rows with 4 inputs do not determine the parameters",
-    "check_regressor_multioutput": "its 10 rows with 10 inputs and 5 outputs do not determine the parameters",
-    "check_estimators_nan_inf": "its 10 rows with 3 inputs are too few for two coefficients each; passes with na=1, nb=1",
-    "check_estimators_dtypes": "its 20 rows of whole numbers do not determine 12 parameters; passes with na=1, nb=1",
 }
-"""The checks of `sklearn.utils.estimator_checks.check_estimator` that an `ARXRegressor` fails by what it is, and why; a
-`StateSpaceRegressor` fails some of them."""
+"""The checks of `sklearn.utils.estimator_checks.check_estimator` that these regressors fail by what they are, and why."""
+
+
+def scorer(metric: str = "r2") -> Callable[[Any, Any, Any], float]:
+    """A metric of scikit-learn for `cross_val_score`, `GridSearchCV` and their like, of predictions that see the measured outputs.
+
+    scikit-learn's own scorers call ``predict(X)`` without y, from which a prediction with a horizon has nothing to start. This one calls
+    ``predict(X, y)``, and leaves out the rows that have no prediction.
+
+    Parameters
+    ----------
+    metric : str, default "r2"
+        The name of a scorer of regressions, such as ``"neg_mean_squared_error"``.
+
+    Returns
+    -------
+    callable
+        For the parameter ``scoring``.
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> from sklearn.model_selection import TimeSeriesSplit, cross_val_score
+    >>> log, cv = th.dc_motor(), TimeSeriesSplit(3, gap=10)
+    >>> scoring = th.sklearn.scorer("neg_root_mean_squared_error")
+    >>> scores = cross_val_score(th.sklearn.ARXRegressor(horizon=1), log.u, log.y, cv=cv, scoring=scoring)
+    >>> bool(scores.min() > -1)
+    True
+    """
+    known = get_scorer(metric)
+    if not hasattr(known, "_score_func") or not hasattr(known, "_sign"):
+        raise ValueError(f"metric: {metric!r} is no scorer of predictions; give one such as 'r2'")
+
+    def score(estimator: Any, X: Any, y: Any) -> float:
+        predicted = np.asarray(estimator.predict(X, y=y), dtype=np.float64)
+        measured = _numbers.array("y", y).reshape(predicted.shape)
+        rows = ~(np.isnan(predicted) | np.isnan(measured)).reshape(len(predicted), -1).any(axis=1)
+        return float(known._sign * known._score_func(measured[rows], predicted[rows], **known._kwargs))
+
+    return score
 
 _OPTIONS = (
     "estimate",
@@ -99,6 +137,10 @@ _STATES = (
 )
 
 
+Orders = Union[int, "Sequence[int]", "Mapping[str, int]"]
+"""One order for all inputs, or one for each, by the names of the columns too."""
+
+
 # Without stubs of scikit-learn its classes are Any to mypy.
 class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """What the regressors have in common: predictions of a fitted model, and the log of an array."""
@@ -132,7 +174,12 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         self._check_horizon()
         inputs = self._inputs(X, reset=True)
-        self.model_ = self._fitted(self._log(inputs, self._output(y, inputs), self._times(X, y)))
+        log = self._log(inputs, self._output(y, inputs), self._times(X, y))
+        try:
+            self.model_ = self._fitted(log)
+        except EstimationError as refused:
+            self.model_ = self._smaller(log, refused)
+        self._targets = _target_names(y)
         if hasattr(self, "coef_"):
             del self.coef_
         if self.model_.kind != "state-space":
@@ -141,6 +188,41 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def _fitted(self, log: Log) -> Model:
         raise NotImplementedError
+
+    def _smaller(self, log: Log, refused: EstimationError) -> Model:
+        """A model that the rows determine where they do not determine the one that was asked for; else what was said of that."""
+        raise refused
+
+    def set_output(self, *, transform: Literal["default", "pandas", "polars"] | None = None) -> Self:
+        """Say what `predict` returns: arrays, or for "pandas" a series with the index of X, of several outputs a frame, for "polars" those.
+
+        Parameters
+        ----------
+        transform : {"default", "pandas", "polars"}, optional
+            As for scikit-learn's transformers; None changes nothing.
+
+        Returns
+        -------
+        Self
+
+        Examples
+        --------
+        >>> import pandas as pd
+        >>> import thetahat as th
+        >>> log = th.dc_motor()
+        >>> X = pd.DataFrame({"u": log["u"]}, pd.date_range("2026-03-01", periods=1000, freq="s"))
+        >>> regressor = th.sklearn.ARXRegressor().set_output(transform="pandas").fit(X, pd.Series(log.y, X.index, name="speed"))
+        >>> regressor.predict(X[:3]).round(1)
+        2026-03-01 00:00:00    81.2
+        2026-03-01 00:00:01    80.4
+        2026-03-01 00:00:02    78.4
+        Freq: s, Name: speed, dtype: float64
+        """
+        if transform not in (None, "default", "pandas", "polars"):
+            raise ValueError(f"transform: {transform!r} is none of 'default', 'pandas' and 'polars'")
+        if transform is not None:
+            self._output_as = transform
+        return self
 
     def predict(self, X: ArrayLike | None, y: ArrayLike | None = None) -> NDArray[np.float64]:
         """Predict the output.
@@ -168,6 +250,24 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         sklearn.exceptions.NotFittedError
             If there is no model yet.
         """
+        found = self._predicted(X, y)
+        kind = getattr(self, "_output_as", "default")
+        if kind == "default":
+            return found
+        names = self._target_names()
+        table = {names[0]: found} if found.ndim == 1 else dict(zip(names, found.T))
+        if kind == "polars":
+            frame: Any = _clock.imported("polars").DataFrame(table)
+        else:
+            frame = _clock.imported("pandas").DataFrame(table, _clock.common_index([("X", X), ("y", y)]))
+        named: NDArray[np.float64] = frame[names[0]] if found.ndim == 1 else frame
+        return named
+
+    def _target_names(self) -> list[str]:
+        """What the outputs were called in the fit."""
+        return list(getattr(self, "_targets", None) or self.model_.outputs)
+
+    def _predicted(self, X: ArrayLike | None, y: ArrayLike | None) -> NDArray[np.float64]:
         check_is_fitted(self)
         self._check_horizon()
         inputs = self._inputs(X, reset=False)
@@ -189,8 +289,8 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             return np.asarray(lines[:, 0] if len(offsets) == 1 else lines, dtype=np.float64)
         if y is None:
             message = (
-                f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), "
-                "or horizon=None for a free run, which needs none"
+                f"y: a prediction {self.horizon} samples ahead starts from measured outputs; give predict(X, y), in a search or a "
+                "cross-validation scoring=thetahat.sklearn.scorer('r2'), or horizon=None for a free run, which needs none"
             )
             raise ValueError(message)
         outputs = self._output(y, inputs)
@@ -223,7 +323,7 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         ValueError
             As for `predict`, or if there are not two such samples.
         """
-        predicted = self.predict(X, y)
+        predicted = self._predicted(X, y)
         measured = self._output(y, predicted)
         if measured.shape != predicted.shape:
             message = f"y: expected an array of shape {predicted.shape}, found one of {measured.shape}"
@@ -330,6 +430,13 @@ class _Regressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         )
 
 
+def _target_names(y: Any) -> list[str] | None:
+    """The names of a series or of the columns of a frame."""
+    if is_pandas_like_series(y):
+        return None if y.name is None else [str(y.name)]
+    return [str(name) for name in y.columns] if is_pandas_like_dataframe(y) else None
+
+
 def _score(measured: NDArray[np.float64], predicted: NDArray[np.float64], weights: NDArray[Any] | None) -> float:
     """R^2 of one output."""
     known = ~(np.isnan(predicted) | np.isnan(measured))
@@ -349,10 +456,10 @@ class ARXRegressor(_Regressor):
     ----------
     na : int, default=2
         Coefficients of A: how many past outputs there are.
-    nb : int or sequence of int, default=2
-        Coefficients of B, for all inputs or one for each.
-    nk : int or sequence of int, default=1
-        Samples from an input's change to its first effect, for all inputs or one for each.
+    nb : int, sequence of int or dict of str to int, default=2
+        Coefficients of B, for all inputs or one for each, by the names of the columns too.
+    nk : int, sequence of int or dict of str to int, default=1
+        Samples from an input's change to its first effect, for all inputs or one for each, by the names of the columns too.
     horizon : int or None, default=None
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=None
@@ -379,8 +486,10 @@ class ARXRegressor(_Regressor):
     NaN in y means a sample that is missing. Without inputs, X being None, this is an AR model of y, and nb and nk are not read;
     its free run is the level that was taken from y before the fit.
 
-    With a horizon leave `scoring` of searches and cross-validation at its default, which is `score`: all others call `predict`
-    without the outputs. The `predict` of a pipeline hands them on: `pipeline.predict(X, y=y)`.
+    With a horizon, `scoring` of searches and cross-validation is left at its default, which is `score`, or is a `scorer` of this module:
+    scikit-learn's own call `predict` without the outputs. The `predict` of a pipeline hands them on: `pipeline.predict(X, y=y)`.
+
+    Rows that are too few for the orders, as in a first fold, get as many coefficients as they determine, with a warning.
 
     It passes scikit-learn's `check_estimator` but for `EXPECTED_FAILED_CHECKS` of this module, which says why:
     ``check_estimator(ARXRegressor(), expected_failed_checks=EXPECTED_FAILED_CHECKS)``.
@@ -403,8 +512,8 @@ class ARXRegressor(_Regressor):
     def __init__(
         self,
         na: int = 2,
-        nb: int | Sequence[int] = 2,
-        nk: int | Sequence[int] = 1,
+        nb: Orders = 2,
+        nk: Orders = 1,
         *,
         horizon: int | None = None,
         sample_time: float | None = None,
@@ -462,9 +571,43 @@ class ARXRegressor(_Regressor):
         self.time_limit = time_limit
 
     def _fitted(self, log: Log) -> Model:
-        orders = {"nb": _orders(self.nb), "nk": _orders(self.nk)} if log.inputs else {"nb": 0}
+        nb = _orders("nb", self.nb, log.inputs) if log.inputs else 0
+        return self._of_orders(log, self.na, nb)
+
+    def _of_orders(self, log: Log, na: int, nb: int | list[int]) -> Model:
+        orders: Any = {"nb": nb, "nk": _orders("nk", self.nk, log.inputs)} if log.inputs else {"nb": nb}
         options: Any = {name: getattr(self, name) for name in _OPTIONS}
-        return arx(log, na=self.na, **orders, **options)
+        return arx(log, na=na, **orders, **options)
+
+    def _smaller(self, log: Log, refused: EstimationError) -> Model:
+        """Few rows, as in a first fold: as many coefficients as they determine, in the end none but the level."""
+        nb = _orders("nb", self.nb, log.inputs) if log.inputs else 0
+        na = int(self.na)
+        while na > 0:
+            na, nb = na - 1, [max(order - 1, 0) for order in nb] if isinstance(nb, list) else max(nb - 1, 0)
+            try:
+                with _said.kept():
+                    found = self._of_orders(log, na, nb)
+            except (EstimationError, ValueError):
+                continue
+            _said.warn(f"{refused}; fitted with na={na}, nb={nb} instead", EstimationWarning)
+            return found
+        if np.isnan(log.y).all():
+            raise refused
+        _said.warn(f"{refused}; the level of y stands for a model", EstimationWarning)
+        level = np.nanmean(np.atleast_2d(log.y.T), axis=1)
+        count = len(level)
+        none = np.zeros((1, len(log.inputs)))
+        return Model.from_state_space(
+            [[0.0]],
+            none,
+            np.zeros((count, 1)),
+            np.zeros((count, len(log.inputs))),
+            sample_time=log.sample_time,
+            inputs=log.inputs,
+            outputs=log.outputs,
+            offset=dict(zip(log.outputs, level.tolist())),
+        )
 
 
 class NARXRegressor(_Regressor):
@@ -479,8 +622,8 @@ class NARXRegressor(_Regressor):
         Past outputs that g reads.
     nu : int or sequence of int, default=2
         Values of each input that g reads, for all inputs or one for each.
-    nk : int or sequence of int, default=1
-        Samples from an input's change to its first effect, for all inputs or one for each.
+    nk : int, sequence of int or dict of str to int, default=1
+        Samples from an input's change to its first effect, for all inputs or one for each, by the names of the columns too.
     horizon : int or None, default=None
         How many samples ahead `predict` and `score` predict. None: the free run, which sees no outputs.
     sample_time : float, default=None
@@ -523,8 +666,8 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         self,
         map: Map = "poly",
         ny: int = 2,
-        nu: int | Sequence[int] = 2,
-        nk: int | Sequence[int] = 1,
+        nu: Orders = 2,
+        nk: Orders = 1,
         *,
         horizon: int | None = None,
         sample_time: float | None = None,
@@ -589,7 +732,8 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
         self.offset = offset
 
     def _fitted(self, log: Log) -> Model:
-        lags: Any = {"nu": _orders(self.nu), "nk": _orders(self.nk)} if log.inputs else {"nu": 0}
+        names = log.inputs
+        lags: Any = {"nu": _orders("nu", self.nu, names), "nk": _orders("nk", self.nk, names)} if names else {"nu": 0}
         options: Any = {name: getattr(self, name) for name in NarxOptions.__annotations__}
         return narx(log, self.map, ny=int(self.ny), **lags, **options)
 
@@ -643,7 +787,7 @@ constant : default=None
     def __init__(
         self,
         order: int | range | None = None,
-        nk: int | Sequence[int] | None = None,
+        nk: Orders | None = None,
         *,
         horizon: int | None = None,
         sample_time: float | None = None,
@@ -685,12 +829,20 @@ constant : default=None
 
     def _fitted(self, log: Log) -> Model:
         options: Any = {name: getattr(self, name) for name in _STATES}
-        delays = _orders(self.nk) if log.inputs and self.nk is not None else None
+        delays = _orders("nk", self.nk, log.inputs) if log.inputs and self.nk is not None else None
         return ss(log, self.order, nk=delays, **options)
 
 
-def _orders(orders: int | Sequence[int]) -> int | list[int]:
-    """One order for all inputs, or a list of one for each."""
+def _orders(argument: str, orders: Orders, names: Sequence[str]) -> int | list[int]:
+    """One order for all inputs, or a list of one for each, which may be given by name."""
+    if isinstance(orders, Mapping):
+        other = set(orders) - set(names)
+        if other:
+            raise ValueError(f"{argument}: {sorted(other)[0]!r} is no input; there are {', '.join(map(repr, names))}")
+        left = [name for name in names if name not in orders]
+        if left:
+            raise ValueError(f"{argument}: there is none for {left[0]!r}; give one for each input")
+        return [int(orders[name]) for name in names]
     if isinstance(orders, numbers.Integral):
         return int(orders)
     return [int(order) for order in orders]  # type: ignore[union-attr]

@@ -49,7 +49,7 @@ pub(super) fn anneal<O: Objective>(
     let mut trial = here.clone();
     let stages = options.max_iterations.max(1);
     for stage in 0..stages {
-        if monitor(Progress { iteration: stage, cost: objective.mean(own) }).is_break() {
+        if monitor(Progress { iteration: stage, cost: objective.mean(own), models: None }).is_break() {
             return Err(Error::Interrupted);
         }
         if deadline.is_over() {

@@ -50,6 +50,8 @@ pub struct Progress {
     /// The cost for each sample, as the mean of e^2; for a model in equations the negative logarithm of the likelihood,
     /// for one in state space ln det cov e.
     pub cost: f64,
+    /// How many models a choice has searched for, and how many there are at most; none of a search alone.
+    pub models: Option<(usize, usize)>,
 }
 
 /// A function that is called with the progress of a search, and may end it.

@@ -81,7 +81,9 @@ pub fn search<O: Objective>(
     let mut gradient_norm;
     let stopped = loop {
         let iteration = costs.len() - 1;
-        if monitor(Progress { iteration, cost: descent.objective.mean(descent.cost) }).is_break() {
+        if monitor(Progress { iteration, cost: descent.objective.mean(descent.cost), models: None })
+            .is_break()
+        {
             return Err(Error::Interrupted);
         }
         // The free responses alone can lower the cost by so much.

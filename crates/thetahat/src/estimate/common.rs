@@ -1,6 +1,7 @@
 //! Fits of several models to the same samples, so that their costs can be compared.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use thetahat_numerics::optimize::{Deadline, Monitor, Search, best_free, search};
 
@@ -44,6 +45,8 @@ pub(crate) struct Common<'a> {
     smallest: f64,
     deadline: Deadline,
     monitor: Monitor<'a>,
+    /// Counts models, see [`finished`](Common::finished).
+    done: Option<&'a AtomicUsize>,
 }
 
 /// A model that was fitted.
@@ -74,7 +77,19 @@ impl<'a> Common<'a> {
         let options = Search { initial_parameters: None, starts: 0, tolerance, ..options.clone() };
         let smallest = NOTHING_LEFT * energy(record);
         let begin = if free { InitialCondition::Unknown } else { InitialCondition::Zero };
-        Ok(Self { record, begin, window, options, smallest, deadline, monitor })
+        Ok(Self { record, begin, window, options, smallest, deadline, monitor, done: None })
+    }
+
+    /// The same that counts the models that are finished.
+    pub(crate) fn counting(self, done: &'a AtomicUsize) -> Self {
+        Self { done: Some(done), ..self }
+    }
+
+    /// Counts a model that all was done for.
+    pub(crate) fn finished(&self) {
+        if let Some(done) = self.done {
+            done.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     fn predictor(&self, orders: &Orders) -> Predictor<'a> {

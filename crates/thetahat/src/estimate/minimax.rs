@@ -170,7 +170,7 @@ pub(super) fn least(
             break Stopped::TimeLimit;
         }
         let shown = if norm == Norm::Infinity { cost } else { cost / now.errors.len() as f64 };
-        if monitor(Progress { iteration: costs.len() - 1, cost: shown }).is_break() {
+        if monitor(Progress { iteration: costs.len() - 1, cost: shown, models: None }).is_break() {
             return Err(Error::Interrupted);
         }
         let Some(slopes) = now.slopes(predictor) else { break Stopped::NoDescent };

@@ -1,6 +1,9 @@
 //! All models on the same samples.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use thetahat_numerics::optimize::Progress;
 
 use super::candidates::{Compared, Samples, Trial, energy, rows, total};
 use super::drift::{self, Drift};
@@ -87,7 +90,13 @@ pub(super) fn compare(
     let mut hopeless = 0;
     if searched {
         let free = task.initial != Initial::Zero;
-        let common = Common::new(record, free, samples.window, task.search, task.deadline, task.monitor)?;
+        let (done, all) = (AtomicUsize::new(0), tried.iter().filter(|one| !one.orders.is_linear()).count());
+        let told = |now: Progress| {
+            let models = Some((done.load(Ordering::Relaxed).min(all), all));
+            (task.monitor)(Progress { models, ..now })
+        };
+        let common = Common::new(record, free, samples.window, task.search, task.deadline, &told)?;
+        let common = common.counting(&done);
         let score = |orders: &Orders, cost: f64, initial: f64| {
             let (size, mse) = (orders.parameters(), exact(cost) / count as f64);
             let score = score(Select::MDL, mse, size, price(orders, initial), count, None);

@@ -151,7 +151,9 @@ impl Family {
             let level: Vec<usize> = level.iter().copied().filter(|&k| which(tried, k)).collect();
             let fitted = level.par_iter().map(|&k| {
                 let starts = self.starts(k, tried);
-                common.fit(&tried[k].orders, &starts, number == 0 || starts.is_empty())
+                let fitted = common.fit(&tried[k].orders, &starts, number == 0 || starts.is_empty());
+                common.finished();
+                fitted
             });
             let fitted = fitted.collect::<Result<Vec<_>, Error>>()?;
             level.iter().zip(fitted).for_each(|(&k, point)| tried[k].point = point);

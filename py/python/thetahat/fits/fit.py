@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 from thetahat import _thetahat
-from thetahat.base import said as _said
+from thetahat.base import progress as _progress, said as _said
+from thetahat.base.progress import Progress
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
 from thetahat.engine.option_types import FitOptions, ImpulseResponseOptions
@@ -402,6 +403,7 @@ def fit(
     *,
     narx: Literal["none"] | None = None,
     plan: Model | Mapping[str, Any] | None = None,
+    progress: Progress = None,
     **options: Unpack[FitOptions],
 ) -> Model:
     """Fit the model that the data ask for, or the one that a plan says.
@@ -419,6 +421,9 @@ def fit(
     plan : Model or dict, optional
         Repeat the fit of this model, of any kind but one in equations: its `Model.plan`, or such a dict. Options that are given beside it
         come in the place of its own.
+    progress : bool or callable, optional
+        True shows how far it is, by tqdm if that is installed; a function is called with how many models or iterations are done, of how
+        many, where that is known, and the least cost so far.
     **options
         What to fit to and what the model is for, see `thetahat.FitOptions`.
 
@@ -449,14 +454,17 @@ def fit(
             raise ValueError("plan: the document of this model has none; fit it again")
         chosen = log.select(inputs=known.pop("input", None), output=known.pop("output", None))
         given = json.loads(_options.plan({"narx": narx, **options}, len(log)))
-        return told(Model._of(_thetahat.fit(handle("log", chosen), json.dumps({**known, **given}))))
+        with _progress.told(progress, "fit"):
+            return told(Model._of(_thetahat.fit(handle("log", chosen), json.dumps({**known, **given}))))
     if isinstance(log, Log) and len(log.outputs) > 1 and not log.inputs:
         *others, last = log.outputs
         raise ValueError(
             f"log: {', '.join(others)} and {last} are all outputs, and there is no input; give the inputs apart, as "
             f"Log(frame[{last!r}], frame[{others!r}])"
         )
-    return fitted(log, {"narx": narx}, options)
+    with _progress.told(progress, "fit"):
+        return fitted(log, {"narx": narx}, options)
+
 
 
 @_options.takes(FitOptions)
@@ -472,6 +480,7 @@ def search(
     nk: Orders | None = None,
     select: str | None = None,
     path: Literal["all", "alternate"] | None = None,
+    progress: Progress = None,
     **options: Unpack[FitOptions],
 ) -> Model:
     """Choose a model among many, all compared on the same samples.
@@ -490,6 +499,9 @@ def search(
         What makes one model better than another: MDL, unless said otherwise.
     path : {"all", "alternate"}
         Which are tried: all of them, or one order up at a time.
+    progress : bool or callable, optional
+        True shows how far it is, by tqdm if that is installed; a function is called with how many models or iterations are done, of how
+        many, where that is known, and the least cost so far.
     **options
         What to fit to and how to search, see `thetahat.FitOptions`.
 
@@ -511,7 +523,8 @@ def search(
     17
     """
     own = {"model": model, "na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk, "select": select, "path": path}
-    return fitted(log, own, options)
+    with _progress.told(progress, "search"):
+        return fitted(log, own, options)
 
 
 def fitted(log: Log, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
@@ -522,6 +535,7 @@ def fitted(log: Log, own: Mapping[str, Any], options: Mapping[str, Any]) -> Mode
 
 def told(model: Model) -> Model:
     """A model of whose warnings the caller is told."""
+    _said.LOGGER.info("fitted %s", model.name)
     for warning in model._model.warnings():
         _said.warn(warning, EstimationWarning)
     return model

@@ -11,10 +11,12 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
+from threading import Lock
 from typing import Any, Union
 
 from thetahat import _thetahat
-from thetahat.base import said as _said
+from thetahat.base import progress as _progress, said as _said
+from thetahat.base.progress import Progress
 from thetahat.engine import files as _files, options as _options
 from thetahat.fits.fit import search
 from thetahat.logs.inspection import Inspection
@@ -243,6 +245,7 @@ def fit_many(
     read: Mapping[str, Any] | None = None,
     reports: str | os.PathLike[str] | None = None,
     threads: int | None = None,
+    progress: Progress = None,
     **options: Any,
 ) -> Fits:
     """Fit each of many logs a model of its own.
@@ -266,6 +269,8 @@ def fit_many(
         where ``fit`` is a function of your own, an argument is more than numbers, texts and lists of them, or the folder is a URL.
     threads : int, optional
         How many threads to use: as many as there are cores, unless said otherwise.
+    progress : bool or callable, optional
+        True shows how many logs are done, by tqdm if that is installed; a function is called with how many are done, of how many, and None.
     **options
         The arguments of ``fit``.
 
@@ -300,16 +305,23 @@ def fit_many(
     journal = work.journal(reports)
 
     stop = _thetahat.Stop()
+    done, lock = 0, Lock()
 
     def one(place: int) -> tuple[dict[str, Any], Any]:
+        nonlocal done
         name, item = named[place]
         before = _thetahat.threads(count, stop)
         try:
             return work(name, item, files[place], journal)
         finally:
             _thetahat.threads(*before)
+            if tell is not None:
+                with lock:
+                    done += 1
+                    tell(done, len(named), None)
 
     with ExitStack() as stack:
+        tell = stack.enter_context(_progress.shown(progress, "logs"))
         if journal is not None:
             stack.callback(journal.close)
         pool = stack.enter_context(ThreadPoolExecutor(min(count, len(named))))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, Union
 
+from thetahat.base import progress as _progress
+from thetahat.base.progress import Progress
 from thetahat.engine import options as _options
 from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import fitted
@@ -29,6 +31,7 @@ def narx(
     ny: Lags | None = None,
     nu: Lags | None = None,
     nk: Lags | None = None,
+    progress: Progress = None,
     **options: Unpack[NarxOptions],
 ) -> Model:
     """Fit a nonlinear ARX model, y(k) = g(past outputs and inputs) + e(k).
@@ -51,6 +54,9 @@ def narx(
         Values of the input that g reads, from ``nk`` on, 2 unless it is said; 0 for a time series.
     nk : int, or one for each input
         Samples from input to first effect, 1 unless it is said; 0 where it acts at once.
+    progress : bool or callable, optional
+        True shows how far it is, by tqdm if that is installed; a function is called with how many models or iterations are done, of how
+        many, where that is known, and the least cost so far.
     regressors, degree, terms, most_terms, centres, width, units, linear, membership, select, ridge, raw_terms, drawn, focus, search, \
 max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, split, detrend, offset
         Which functions, what to fit to and how, see `thetahat.NarxOptions`.
@@ -87,4 +93,5 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
     """
     if map == "none":  # type: ignore[comparison-overlap]
         raise ValueError("map: narx fits a nonlinear model; name its functions, or fit a linear one")
-    return fitted(log, {"narx": map, "ny": ny, "nu": nu, "nk": nk}, options)
+    with _progress.told(progress, "narx"):
+        return fitted(log, {"narx": map, "ny": ny, "nu": nu, "nk": nk}, options)

@@ -9,6 +9,7 @@ import stat
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,3 +66,30 @@ def test_what_a_test_starts_has_the_default_signals() -> None:
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "True"
     assert signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+
+
+def test_messages_say_what_a_long_value_is_and_not_all_of_it() -> None:
+    # Calls that no type checker lets pass.
+    wrong: Any = th
+    log: Any = th.dc_motor()
+    model, values = wrong.arx(log, 2, 2), np.arange(2000.0)
+    calls: list[tuple[Any, str]] = [
+        (lambda: wrong.arx(log, 2, 2, estimate=(0, 700)), r"slice\(0, 700\) are these rows"),
+        (lambda: wrong.arx(log, 2, 2, estimate=values), r"estimate: .*found ndarray of shape \(2000,\)"),
+        (lambda: wrong.arx(log, values.tolist(), 2), "na: .*…"),
+        (lambda: wrong.arx(log, 2, 2, ridge=values), "ridge: .*of shape"),
+        (lambda: wrong.narx(log, values), "map: expected a str, found ndarray"),
+        (lambda: model.predict(log, values), "horizon: .*of shape"),
+        (lambda: model.validate(log, rows=(0, 700)), r"rows: .*slice\(0, 700\)"),
+        (lambda: log[values], "cut by a slice such as .*of shape"),
+        (lambda: wrong.Log(log, log), "y: expected numbers, found a Log"),
+        (lambda: wrong.Log("motor.csv"), r"found a text; a file is read by thetahat.read_log\('motor.csv'\)"),
+        (lambda: wrong.fit_many(log), "logs: expected several, found a Log"),
+        (lambda: wrong.fit_many([log], "arx"), "fit: expected a function such as thetahat.arx"),
+        (lambda: wrong.Tracker(values.tolist(), 2), "na: .*…"),
+        (lambda: wrong.Model.from_json(values), "text: expected a str, found ndarray"),
+    ]
+    for call, words in calls:
+        with pytest.raises(TypeError, match=words) as raised:
+            call()
+        assert len(str(raised.value)) < 250

@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 Columns = Union[ArrayLike, Mapping[str, ArrayLike]]
 """Channels: an array with a column for each, a data frame, or columns by name."""
 
+LONGEST = 80
+"""How much of a value a message shows."""
+
 
 def array(argument: str, value: Any) -> Array:
     """Numbers as a contiguous array of float64, of the shape that they have.
@@ -236,3 +239,12 @@ def _no_numbers(argument: str, found: object) -> TypeError:
 def _kind(value: object) -> str:
     kind = type(value)
     return kind.__qualname__ if kind.__module__ == "builtins" else f"{kind.__module__}.{kind.__qualname__}"
+
+
+def shown(value: Any) -> str:
+    """A value as messages show it: of an array what it is, of what is long the beginning."""
+    shape = getattr(value, "shape", None)
+    if isinstance(shape, tuple) and shape:
+        return f"{type(value).__name__} of shape {shape}"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

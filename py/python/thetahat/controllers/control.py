@@ -13,6 +13,7 @@ from numpy.random import default_rng
 from numpy.typing import ArrayLike
 
 from thetahat import _thetahat
+from thetahat.base import numbers as _numbers
 from thetahat._thetahat import RstController
 from thetahat.engine import options as _options
 from thetahat.engine.document import Document
@@ -112,11 +113,11 @@ def _poles(name: str, given: complex | Sequence[complex]) -> list[tuple[float, f
     try:
         each = np.atleast_1d(np.asarray(given, dtype=np.complex128))
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}: expected numbers, found {given!r}") from error
+        raise TypeError(f"{name}: expected numbers, found {_numbers.shown(given)}") from error
     if each.ndim != 1 or each.size == 0:
         raise ValueError(f"{name}: expected one or more poles")
     if not np.isfinite(each).all():
-        raise ValueError(f"{name}: expected finite numbers, found {given!r}")
+        raise ValueError(f"{name}: expected finite numbers, found {_numbers.shown(given)}")
     return [(float(pole.real), float(pole.imag)) for pole in each]
 
 

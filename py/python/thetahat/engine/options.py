@@ -18,6 +18,7 @@ from typing import Any, Callable, Literal, Optional, TypedDict, TypeVar, Union, 
 
 import numpy as np
 
+from thetahat.base import numbers as _numbers
 from thetahat.engine import files as _files, signatures as _signatures
 from thetahat.engine.values import Duration, Resample
 
@@ -127,7 +128,7 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
             found["term"] = [text(name, one) for one in value]
         elif name == "regressors":
             if not isinstance(value, (list, tuple)):
-                raise TypeError(f"regressors: expected a sequence of str, found {value!r}")
+                raise TypeError(f"regressors: expected a sequence of str, found {_numbers.shown(value)}")
             found["regressor"] = [text(name, one) for one in value] or None
         elif name == "feedthrough":
             found[name] = "yes" if flag(name, value) else "no"
@@ -151,7 +152,7 @@ def _orders(name: str, value: Any) -> list[str]:
     if not isinstance(value, (list, tuple)):
         return [_order(name, value)]
     if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
-        raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
+        raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {_numbers.shown(value)}")
     texts = [_order(name, one) for one in value]
     if not texts:
         raise ValueError(f"{name}: there is none; give one for each channel")
@@ -212,7 +213,7 @@ def integer(name: str, value: Any) -> int:
     if not isinstance(value, bool):
         with contextlib.suppress(TypeError):
             return operator.index(value)
-    raise TypeError(f"{name}: expected an int, found {value!r}")
+    raise TypeError(f"{name}: expected an int, found {_numbers.shown(value)}")
 
 
 def count(name: str, value: Any, most: int = 10_000_000) -> int:
@@ -226,11 +227,11 @@ def count(name: str, value: Any, most: int = 10_000_000) -> int:
 def number(name: str, value: Any) -> str:
     """A finite number, written so that it is read back exactly."""
     if isinstance(value, (bool, str, bytes)):
-        raise TypeError(f"{name}: expected a number, found {value!r}")
+        raise TypeError(f"{name}: expected a number, found {_numbers.shown(value)}")
     try:
         found = float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: expected a number, found {value!r}") from None
+        raise TypeError(f"{name}: expected a number, found {_numbers.shown(value)}") from None
     if not math.isfinite(found):
         raise ValueError(f"{name}: {found} is not a finite number")
     return repr(found)
@@ -272,21 +273,21 @@ def named(name: str, value: Any) -> dict[str, float] | None:
     if value is None:
         return None
     if not isinstance(value, Mapping):
-        raise TypeError(f"{name}: expected a dict, found {value!r}")
+        raise TypeError(f"{name}: expected a dict, found {_numbers.shown(value)}")
     return {text(name, key): float(number(name, one)) for key, one in value.items()} or None
 
 
 def text(name: str, value: Any) -> str:
     """The value, if it is a str."""
     if not isinstance(value, str):
-        raise TypeError(f"{name}: expected a str, found {value!r}")
+        raise TypeError(f"{name}: expected a str, found {_numbers.shown(value)}")
     return value
 
 
 def resampling(name: str, value: Any) -> tuple[float, str, bool]:
     """The step in seconds, how to read between rows, and whether to filter against aliasing."""
     if not isinstance(value, (tuple, list)) or len(value) not in (2, 3):
-        raise TypeError(f"{name}: expected (seconds, 'linear', 'hold' or 'auto'), found {value!r}")
+        raise TypeError(f"{name}: expected (seconds, 'linear', 'hold' or 'auto'), found {_numbers.shown(value)}")
     if len(value) == 3 and value[2] != "unfiltered":
         raise ValueError(f"{name}: {value[2]!r} is not 'unfiltered'; leave it out for a filter")
     return seconds(name, value[0]), text(name, value[1]), len(value) == 2
@@ -294,7 +295,7 @@ def resampling(name: str, value: Any) -> tuple[float, str, bool]:
 
 def flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool):
-        raise TypeError(f"{name}: expected True or False, found {value!r}")
+        raise TypeError(f"{name}: expected True or False, found {_numbers.shown(value)}")
     return value
 
 
@@ -339,14 +340,17 @@ def rows_of(name: str, value: Any, rows: int | None) -> list[str]:
     if isinstance(value, (slice, range)):
         return [_span(name, value, 1)]
     if isinstance(value, (list, tuple)):
+        ends = len(value) == 2 and all(isinstance(end, (int, np.integer)) for end in value)
+        if ends:
+            raise TypeError(f"{name}: expected a slice, found {value!r}; slice({value[0]}, {value[1]}) are these rows, or range({value[0]}, {value[1]})")
         return [one for part in value for one in rows_of(name, part, rows)]
-    raise TypeError(f"{name}: expected a slice, a range or a text such as '1..500', found {value!r}")
+    raise TypeError(f"{name}: expected a slice, a range or a text such as '1..500', found {_numbers.shown(value)}")
 
 
 def _bound(name: str, value: Any) -> str:
     if isinstance(value, (tuple, list)):
         if len(value) != 2:
-            raise ValueError(f"{name}: expected a value or a lower and an upper end, found {value!r}")
+            raise ValueError(f"{name}: expected a value or a lower and an upper end, found {_numbers.shown(value)}")
 
         def end(limit: Any) -> str:
             open_end = limit is None or (isinstance(limit, float) and math.isinf(limit))
@@ -368,11 +372,11 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         return [",".join(rows_of(name, value, rows))]
     if name == "values":
         if not isinstance(value, Mapping):
-            raise TypeError(f"{name}: expected a dict, found {value!r}")
+            raise TypeError(f"{name}: expected a dict, found {_numbers.shown(value)}")
         return [f"{text(name, word)}={number(name, of)}" for word, of in value.items()]
     if name in ("offset", "scale", "bound"):
         if not isinstance(value, Mapping):
-            raise TypeError(f"{name}: expected a dict, found {value!r}")
+            raise TypeError(f"{name}: expected a dict, found {_numbers.shown(value)}")
         return [f"{text(name, key)}={_bound(name, of) if name == 'bound' else number(name, of)}" for key, of in value.items()]
     if name == "dc_gain":
         if isinstance(value, Mapping):
@@ -384,7 +388,7 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         if isinstance(value, str):
             return [value]
         if not isinstance(value, Sequence):
-            raise TypeError(f"{name}: expected three numbers such as (60, 20, 20), found {value!r}")
+            raise TypeError(f"{name}: expected three numbers such as (60, 20, 20), found {_numbers.shown(value)}")
         return ["/".join(_plain(number(name, part)) for part in value)]
     if name == "focus":
         return [value if isinstance(value, str) else str(integer(name, value))]
@@ -403,11 +407,11 @@ def _texts(name: str, value: Any, rows: int | None) -> list[str]:
         if isinstance(value, np.ndarray):
             value = value.ravel().tolist()
         if isinstance(value, str) or not isinstance(value, Sequence):
-            raise TypeError(f"{name}: expected a band such as (0.1, 3), or a list of frequencies, found {value!r}")
+            raise TypeError(f"{name}: expected a band such as (0.1, 3), or a list of frequencies, found {_numbers.shown(value)}")
         return [",".join(number(name, one) for one in value)]
     if name in ("range", "band"):
         if not isinstance(value, (tuple, list)) or len(value) != 2:
-            raise TypeError(f"{name}: expected a lower and an upper end, found {value!r}")
+            raise TypeError(f"{name}: expected a lower and an upper end, found {_numbers.shown(value)}")
         return [f"{number(name, value[0])}..{number(name, value[1])}"]
     if name == "horizon":
         every = value if isinstance(value, (list, tuple)) else [value]

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
+from thetahat.base import numbers as _numbers
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import EquationsOptions
 from thetahat.fits.fit import told
@@ -93,7 +94,7 @@ def _text_of(value: Any) -> str:
 
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise TypeError(f"{name}: expected a number, found {value!r}")
+        raise TypeError(f"{name}: expected a number, found {_numbers.shown(value)}")
     return float(value)
 
 
@@ -343,7 +344,7 @@ def _plain(name: str, value: Any) -> Any:
     if isinstance(plain, float) and not np.isfinite(plain):
         raise ValueError(f"{name}: {plain} is not a finite number")
     if not isinstance(plain, (bool, int, float, str)):
-        raise TypeError(f"{name}: expected a number, a text or a dict, found {plain!r}")
+        raise TypeError(f"{name}: expected a number, a text or a dict, found {_numbers.shown(plain)}")
     return plain
 
 
@@ -434,4 +435,9 @@ def grey(
     """
     box = model if isinstance(model, GreyBox) else GreyBox(model)
     data = handle("log", log)
+    if not box.unknown:
+        raise ValueError(
+            "model: none of its parameters is unknown, so that there is nothing to fit; give one as { start = …, sd = …, unknown = true }, "
+            "or use it as it is: model.simulate(u), thetahat.StateFilter(model)"
+        )
     return told(Model._of(_thetahat.fit_equations(data, box._model, _options.plan(options, len(log)))))

@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any, Union
 
 from thetahat import _thetahat
-from thetahat.base import progress as _progress, said as _said
+from thetahat.base import numbers as _numbers, progress as _progress, said as _said
 from thetahat.base.progress import Progress
 from thetahat.engine import files as _files, options as _options
 from thetahat.fits.fit import search
@@ -298,6 +298,10 @@ def fit_many(
     1   1  OE(2, 2, 1)    18.88
     2   2  OE(2, 2, 1)    18.94
     """
+    if isinstance(logs, Log):
+        raise TypeError("logs: expected several, found a Log; fit_many({'name': log, …}), or one of the fits for a log alone")
+    if not callable(fit):
+        raise TypeError(f"fit: expected a function such as thetahat.arx, found {_numbers.shown(fit)}")
     named = name_all(logs)
     files = reports_of([name for name, _ in named], named, reports)
     count = _threads(threads)

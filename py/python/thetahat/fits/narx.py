@@ -91,6 +91,7 @@ max_iterations, tolerance, step, starts, seed, time_limit, estimate, validate, s
     >>> sorted(model.parameter_names)
     ['u(k-1)', 'u(k-1)^2', 'y(k-1)']
     """
+    _options.text("map", map)
     if map == "none":  # type: ignore[comparison-overlap]
         raise ValueError("map: narx fits a nonlinear model; name its functions, or fit a linear one")
     with _progress.told(progress, "narx"):

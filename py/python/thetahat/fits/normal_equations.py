@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from thetahat import _thetahat
-from thetahat.base import said as _said
+from thetahat.base import numbers as _numbers, said as _said
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options
 from thetahat.engine.values import Order, Orders
@@ -157,7 +157,7 @@ class NormalEquations:
                 if value is not None:
                     raise ValueError(f"{name}: it is not of nonlinear models, whose products are named; leave it or the terms out")
             if isinstance(terms, str):
-                raise TypeError(f"terms: expected a sequence of str, or an int, found {terms!r}")
+                raise TypeError(f"terms: expected a sequence of str, or an int, found {_numbers.shown(terms)}")
             own = {"narx": "poly", "ny": ny, "nu": nu, "nk": nk, "terms": terms, "select": select, "degree": degree}
             own |= {"most_terms": most_terms, "regressors": regressors, "raw_terms": raw_terms}
             self._sums = _thetahat.NormalEquations(data, _options.plan({**own, **common}), _past(past))
@@ -294,7 +294,7 @@ def both_horizons(horizons: tuple[int | None, int | None] | None) -> tuple[int |
     if horizons is None:
         return None, None
     if not isinstance(horizons, (tuple, list)) or len(horizons) != 2:
-        raise TypeError(f"horizons: expected two, the past and the future, found {horizons!r}")
+        raise TypeError(f"horizons: expected two, the past and the future, found {_numbers.shown(horizons)}")
     past, future = (None if one is None else _options.count("horizons", one) for one in horizons)
     return past, future
 

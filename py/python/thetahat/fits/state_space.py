@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.option_types import StateSpaceOptions
 from thetahat.engine.values import Orders
@@ -98,5 +99,5 @@ def ss(
 def states(order: int | range | str | None, nk: Orders | None) -> dict[str, Any]:
     """What asks for a model in state space; the order "auto" is left to the data, as none is."""
     if isinstance(order, str) and order != "auto":
-        raise TypeError(f'order: expected an int, a range or "auto", found {order!r}')
+        raise TypeError(f'order: expected an int, a range or "auto", found {_numbers.shown(order)}')
     return {"model": "ss", "order": None if isinstance(order, str) else order, "nk": nk}

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat.base import clock as _clock, frames as _frames, numbers as _numbers, picture as _picture, said as _said
 from thetahat.base.clock import Clock
+from thetahat.base.numbers import LONGEST
 from thetahat.engine import options as _options
 from thetahat.engine.values import Duration, Resample
 
@@ -84,6 +85,11 @@ class Log:
         output_name: str | Sequence[str] | None = None,
         uniform: bool = True,
     ) -> None:
+        for argument, value in (("y", y), ("u", u)):
+            if isinstance(value, Log):
+                raise TypeError(f"{argument}: expected numbers, found a Log; its channels are log.y, log.u and log['name']")
+            if isinstance(value, str):
+                raise TypeError(f"{argument}: expected numbers, found a text; a file is read by thetahat.read_log({value[:LONGEST]!r})")
         y, u = _numbers.of_xarray(y), _numbers.of_xarray(u)
         channels = _inputs(u, input_names)
         names = [name for name, _ in channels]
@@ -458,7 +464,7 @@ class Log:
                 raise ValueError(f"rows: {rows} is not inside of the log, which has {len(self)}")
             rows = slice(rows.start, rows.stop, rows.step)
         if not isinstance(rows, slice):
-            raise TypeError(f"a log is cut by a slice such as log[:500], found {rows!r}")
+            raise TypeError(f"a log is cut by a slice such as log[:500], found {_numbers.shown(rows)}")
         dated = [end for end in (rows.start, rows.stop) if end is not None and not hasattr(end, "__index__")]
         if dated:
             if rows.step is not None or self._clock.times is None:
@@ -589,7 +595,7 @@ def _is_clock(index: Any) -> bool:
 def _called(argument: str, labels: Any) -> list[str]:
     """The names of columns by their labels, which may be numbers, or in a list tuples."""
     if isinstance(labels, (bool, float)) or labels is None:
-        raise TypeError(f"{argument}: expected a name or several, found {labels!r}")
+        raise TypeError(f"{argument}: expected a name or several, found {_numbers.shown(labels)}")
     several = [labels] if isinstance(labels, (str, int, np.integer)) else labels
     return names_of(argument, [label if isinstance(label, str) else _frames.name_of(label) for label in several])
 

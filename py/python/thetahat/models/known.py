@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thetahat import _thetahat
+from thetahat.base.numbers import shown
 from thetahat.engine import options as _options
 from thetahat.engine.values import Duration
 
@@ -342,11 +343,11 @@ def _numbers(name: str, values: ArrayLike) -> list[float]:
     try:
         found = np.atleast_1d(np.asarray(values, dtype=np.float64))
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}: expected numbers, found {values!r}") from error
+        raise TypeError(f"{name}: expected numbers, found {shown(values)}") from error
     if found.ndim != 1 or found.size == 0:
         raise ValueError(f"{name}: expected a list of numbers, found an array of the shape {found.shape}")
     if not np.isfinite(found).all():
-        raise ValueError(f"{name}: expected finite numbers, found {values!r}")
+        raise ValueError(f"{name}: expected finite numbers, found {shown(values)}")
     return [float(value) for value in found]
 
 
@@ -393,7 +394,7 @@ def _matrix(name: str, values: ArrayLike | None) -> str | None:
     try:
         found = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise TypeError(f"{name}: expected a matrix of numbers, found {values!r}") from error
+        raise TypeError(f"{name}: expected a matrix of numbers, found {shown(values)}") from error
     found = np.atleast_2d(found)
     if found.ndim != 2 or not np.isfinite(found).all():
         raise ValueError(f"{name}: expected a matrix of finite numbers, found one of the shape {found.shape}")

@@ -542,7 +542,7 @@ def _poles(poles: npt.ArrayLike) -> npt.NDArray[np.complex128]:
     try:
         found = np.asarray(poles, dtype=np.complex128)
     except (TypeError, ValueError) as error:
-        raise TypeError(f"poles: expected numbers, found {poles!r}") from error
+        raise TypeError(f"poles: expected numbers, found {_numbers.shown(poles)}") from error
     if found.ndim != 1 or found.size == 0:
         raise ValueError(f"poles: expected one dimension with an entry for each state, found shape {found.shape}")
     return found.copy()

@@ -6,7 +6,7 @@ use thetahat_numerics::distribution::{student_factor, student_two_sided};
 use super::quantity::{Quantity, Root};
 use crate::Error;
 use crate::data::Offset;
-use crate::model::{Orders, Structure};
+use crate::model::{ArimaFactors, Orders, Structure};
 
 /// A channel as a model sees it: its name, and what its values are measured from.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
@@ -100,6 +100,10 @@ pub struct PolynomialModel {
     /// known, and in reports that do not say. Predictions, forecasts and drawn runs count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset_covariance: Option<OffsetCovariance>,
+    /// The factors of C and D of a seasonal ARIMA model: its own parameters, of which those above are functions. None of
+    /// other models.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub factors: Option<ArimaFactors>,
     /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
     pub poles: Vec<Root>,
     /// The finite roots of B in the z plane, for each input.
@@ -250,6 +254,9 @@ impl PolynomialModel {
         let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
         if !self.covariance.as_ref().is_none_or(square) {
             return wrong("covariance does not have a row and a column for each parameter");
+        }
+        if let Some(factors) = &self.factors {
+            factors.check(self)?;
         }
         if let Some(open) = &self.offset_covariance {
             let count = count + open.count();

@@ -1,6 +1,6 @@
 """System identification: models of dynamic systems from logged data.
 
-A log holds measured signals (`Log`, `read_log`, `read_csv`; `topics` lists those of a flight). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
+A log holds measured signals (`Log`, `read_log`, `read_csv`; `topics` lists those of a flight). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `arima`,
 `fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
@@ -57,6 +57,7 @@ from thetahat.base.said import EstimationWarning
 from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, minimum_variance, pole_placement
 from thetahat.controllers.tune import Tuning, tune
 from thetahat.engine.option_types import (
+    ArimaOptions,
     DesignOptions,
     EquationsOptions,
     FitOptions,
@@ -71,6 +72,7 @@ from thetahat.engine.options import ReadOptions
 from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
+from thetahat.fits.arima import arima
 from thetahat.fits.comparison import Comparison, compare
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
 from thetahat.fits.grey_box import GreyBox, grey
@@ -98,6 +100,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Alarm",
+    "ArimaOptions",
     "ChangeDetector",
     "ChangeTrajectory",
     "Comparison",
@@ -167,6 +170,7 @@ __all__ = [
     "WindowedLeastSquares",
     "__version__",
     "ar",
+    "arima",
     "arma",
     "armax",
     "arx",

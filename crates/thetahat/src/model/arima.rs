@@ -247,6 +247,38 @@ impl ArimaOrders {
 }
 
 impl ArimaFactors {
+    /// The equation, such as (1 - q^-1) (1 - q^-12) y(t) = theta(q) Theta(q^12) e(t). z is the output without what a
+    /// constant, a drift and inputs do.
+    pub fn equation(&self) -> String {
+        let orders = &self.orders;
+        let season = orders.season();
+        let ([p, d, q], [sp, sd, sq, _]) = (orders.order, orders.seasonal.unwrap_or_default());
+        let power = |times: usize| if times > 1 { format!("^{times}") } else { String::new() };
+        let inputs = self.parameters.iter().filter(|parameter| parameter.name.starts_with('b')).count();
+        let has = |name: &str| self.parameters.iter().any(|parameter| parameter.name == name);
+        let terms = [
+            (has("constant"), "constant"),
+            (has("drift"), "drift t"),
+            (inputs == 1, "B(q) u(t)"),
+            (inputs > 1, "sum_j B_j(q) u_j(t)"),
+            (true, "z(t)"),
+        ];
+        let terms: Vec<&str> = terms.into_iter().filter(|(there, _)| *there).map(|(_, term)| term).collect();
+        let of = if terms.len() > 1 { "z(t)" } else { "y(t)" };
+        let left = [
+            (p > 0, "phi(q) ".to_owned()),
+            (sp > 0, format!("Phi(q^{season}) ")),
+            (d > 0, format!("(1 - q^-1){} ", power(d))),
+            (sd > 0, format!("(1 - q^-{season}){} ", power(sd))),
+        ];
+        let right = [(q > 0, "theta(q) ".to_owned()), (sq > 0, format!("Theta(q^{season}) "))];
+        let side = |factors: &[(bool, String)]| -> String {
+            factors.iter().filter(|(there, _)| *there).map(|(_, factor)| factor.as_str()).collect()
+        };
+        let equation = format!("{}{of} = {}e(t)", side(&left), side(&right));
+        if terms.len() > 1 { format!("y(t) = {}, {equation}", terms.join(" + ")) } else { equation }
+    }
+
     /// Checks factors that were read: that the polynomials of the model are their products.
     pub(super) fn check(&self, model: &PolynomialModel) -> Result<(), Error> {
         let wrong =

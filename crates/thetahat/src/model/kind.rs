@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::arima::ArimaFactors;
 use super::equations::{EquationsModel, GreyBox};
 use super::fitted::{Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
@@ -432,7 +433,10 @@ impl Model {
     /// What it is called, with the equation where that is short.
     pub fn headline(&self) -> String {
         match self {
-            Self::Polynomial(model) => format!("{}: {}", self.name(), model.orders.equation()),
+            Self::Polynomial(model) => {
+                let own = model.factors.as_ref().map(ArimaFactors::equation);
+                format!("{}: {}", self.name(), own.unwrap_or_else(|| model.orders.equation()))
+            }
             Self::Equations(_)
             | Self::NonlinearArx(_)
             | Self::Process(_)

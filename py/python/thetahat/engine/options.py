@@ -140,7 +140,7 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
     return json.dumps(found)
 
 
-_ORDERS = frozenset(["na", "nb", "nc", "nd", "nf", "nk", "np", "nu", "ny", "nz", "order", "taps"])
+_ORDERS = frozenset(["na", "nb", "nc", "nd", "nf", "nk", "np", "nu", "ny", "nz", "order", "seasonal", "taps"])
 """The options that are orders: values or ranges, one for all channels or one for each."""
 
 
@@ -149,6 +149,9 @@ def _orders(name: str, value: Any) -> list[str]:
         value = value.tolist()
     if not isinstance(value, (list, tuple)):
         return [_order(name, value)]
+    if (name, len(value)) in (("order", 3), ("seasonal", 4)):
+        # p, d, q and P, D, Q, s.
+        return [",".join(_order(name, one) for one in value)]
     if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
         raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {value!r}")
     texts = [_order(name, one) for one in value]

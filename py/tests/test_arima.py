@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 def passengers() -> Array:
     """The logarithm of the monthly passengers of airlines, 1949 to 1960."""
-    return th.read_csv(public_log("air_passengers.csv"), sample_time=1)["y"]
+    return th.read_csv(public_log("air_passengers.csv"), inputs=[], sample_time=1)["y"]
 
 
 def of_statsmodels(model: th.Model, trends: int = 0) -> Array:
@@ -41,9 +41,9 @@ def process(rows: int, ar: float, ma: float, seed: int) -> Array:
     return y[50:]
 
 
-def slope(model: Any, at: Array) -> Array:
+def slope(model: Any, at: Array, length: float = 1e-5) -> Array:
     """The gradient of statsmodels' log-likelihood by differences."""
-    steps = np.diag(1e-5 * np.maximum(np.abs(at), 1e-2))
+    steps = np.diag(length * np.maximum(np.abs(at), 1e-2))
     return np.array([(model.loglike(at + step) - model.loglike(at - step)) / 2 / step.max() for step in steps])
 
 
@@ -53,7 +53,7 @@ def test_the_airline_model_is_that_of_statsmodels() -> None:
     model = th.arima(log, order=(0, 1, 1), seasonal=(0, 1, 1, 12), tolerance=1e-14)
     assert model.parameter_names == ["ma1", "sma12"] and model.kind == "polynomial" and model.samples == 131
     # Box, Jenkins and Reinsel, 1994, table 9.2, have 0.40 and 0.56 in signs of their own.
-    assert np.allclose(model.parameters, [-0.40182, -0.55695], atol=5e-6)
+    assert np.allclose(model.parameters, [-0.40182, -0.55694], atol=5e-6)
     at = of_statsmodels(model)
 
     # The likelihood of the differences is that of simple differencing, and so is AIC.
@@ -62,7 +62,7 @@ def test_the_airline_model_is_that_of_statsmodels() -> None:
     assert np.isclose(model.log_likelihood, own.llf, rtol=1e-10)
     assert np.isclose(model.aic, own.aic, rtol=1e-10) and np.isclose(model.bic, own.bic, rtol=1e-10)
     assert np.abs(slope(differenced, at)[:2]).max() < 1e-4
-    assert np.allclose(model.standard_errors, np.sqrt(np.diag(own.cov_params_approx))[:2], rtol=0.1)
+    assert np.allclose(model.standard_errors, np.sqrt(np.diag(own.cov_params_approx))[:2], rtol=0.01)
 
     # The default begins with a diffuse state whose variance is large, and leaves the first 13 samples out.
     diffuse = SARIMAX(y, order=(0, 1, 1), seasonal_order=(0, 1, 1, 12)).smooth(at)
@@ -147,7 +147,8 @@ def test_differences_go_on_through_missing_values() -> None:
     own = reference.smooth(of_statsmodels(model))
     # Nothing is lost but the missing values: not the differences that they are in.
     assert model.samples == 126 and np.isclose(model.log_likelihood, own.llf, rtol=1e-6)
-    assert np.abs(slope(reference, of_statsmodels(model))[:2]).max() < 1e-2
+    # The diffuse start leaves noise of 1e-7 in its likelihood.
+    assert np.abs(slope(reference, of_statsmodels(model), 1e-3)[:2]).max() < 1e-2
     expected, ahead = own.get_forecast(24), model.forecast(log, steps=24)
     assert np.allclose(ahead.values, expected.predicted_mean, rtol=1e-6)
     assert np.allclose(ahead.standard_deviations, expected.se_mean, rtol=1e-6)
@@ -216,7 +217,7 @@ def test_what_makes_no_sense_is_refused() -> None:
     with pytest.raises(ValueError, match="white noise about a constant"):
         th.arima(log, order=(0, 0, 0))
     with pytest.raises(ValueError, match="constant: differencing takes it"):
-        th.arima(log, order=(0, 1, 1), constant=True)
+        th.arima(log, order=(0, 1, 1), constant="yes")
     with pytest.raises(ValueError, match="trend: differencing more than once"):
         th.arima(log, order=(0, 2, 1), trend=True)
     with pytest.raises(th.EstimationError, match="too few rows"):

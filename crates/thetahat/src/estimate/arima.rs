@@ -15,10 +15,10 @@
 //! ```
 //!
 //! What is minimised is S exp(sum ln f/N), by Fisher scoring with exact derivatives by the parameters of the factors
-//! (`likelihood`), from those of Hannan and Rissanen (`start`). Each factor stays stable and invertible: its roots are
+//! (`likelihood`), from those of Hannan and Rissanen (`start`), and from small ones where that ends on the unit circle. Each factor stays stable and invertible: its roots are
 //! inside the unit circle.
 //!
-//! The covariance of the parameters is the inverse of their information. sigma^2 is S/N, the estimate of largest
+//! The covariance of the parameters is the inverse of their information, the observed one. sigma^2 is S/N, the estimate of largest
 //! likelihood.
 //!
 //! Box and Jenkins, Time Series Analysis: Forecasting and Control, 1970, chapters 7 and 9; Harvey, Forecasting,
@@ -69,6 +69,9 @@ pub(crate) struct ArimaEstimate {
     /// N.
     pub(crate) samples: usize,
     pub(crate) condition: Option<f64>,
+    /// Which parameters are of a factor with a root on the unit circle: they have no standard error, and those of the
+    /// others are as if they were known.
+    pub(crate) held: Vec<bool>,
     pub(crate) outcome: LikelihoodOutcome,
 }
 
@@ -100,6 +103,10 @@ pub(crate) fn arima(
     let given = options.initial_parameters.iter().map(|given| ("initial-parameters", given.clone()));
     for (number, (name, start)) in given.chain(begin.starts).enumerate() {
         let found = search(&mut likelihood, &start, options, smallest, deadline, monitor)?.ok();
+        let settled = found.as_ref().is_some_and(|found| {
+            found.stopped == Stopped::Converged
+                && !on_circle(orders, &found.parameters, samples).contains(&true)
+        });
         outcomes.push(StartOutcome {
             name: name.to_owned(),
             cost: found.as_ref().map(|found| found.costs[0] / samples),
@@ -110,6 +117,10 @@ pub(crate) fn arima(
         {
             winner = number;
             best = Some(found);
+        }
+        // Further starts are for a search that went astray.
+        if settled {
+            break;
         }
     }
     outcomes.swap(0, winner);
@@ -123,21 +134,32 @@ pub(crate) fn arima(
     if best_free(&mut likelihood, &found.parameters).is_err() {
         return Err(out_of_range());
     }
-    finish(likelihood, Found { stability_bound: on_circle(orders, &found, samples), ..found }, options, outcomes)
+    let held = on_circle(orders, &found.parameters, samples);
+    let stability_bound = held.contains(&true);
+    // There the likelihood is flat, as it is the same on both sides.
+    let ended = stability_bound && found.stopped == Stopped::NoDescent;
+    let stopped = if ended { Stopped::Converged } else { found.stopped };
+    finish(likelihood, Found { stability_bound, stopped, ..found }, held, options, outcomes)
 }
 
 /// The estimate of a search that has ended where the likelihood stands.
 fn finish(
     mut likelihood: Likelihood<'_>,
     found: Found,
+    held: Vec<bool>,
     options: &Search,
     starts: Vec<StartOutcome>,
 ) -> Result<ArimaEstimate, Error> {
     let _ = likelihood.linearize();
     let samples = likelihood.samples();
     let (count, cost) = (samples as f64, found.cost());
-    let known = likelihood.inverse();
-    if known.is_none() && found.stopped == Stopped::Converged && !found.stability_bound {
+    let mut known = likelihood.inverse(&held);
+    if let Some((covariance, _)) = &known {
+        let errors: Vec<f64> = covariance.diagonal().iter().map(|own| (own * cost / count).sqrt()).collect();
+        likelihood.observe(&found.parameters, &errors);
+        known = likelihood.inverse(&held);
+    }
+    if known.is_none() && found.stopped == Stopped::Converged {
         return Err(Error::undetermined(
             Vec::new(),
             "the likelihood is flat: other parameters fit as well, the data cannot tell them apart; lower p and q, or P and Q, \
@@ -155,6 +177,7 @@ fn finish(
         noise_variance,
         samples,
         condition,
+        held,
         outcome: LikelihoodOutcome { log_likelihood, search },
     })
 }
@@ -179,22 +202,29 @@ fn enough(likelihood: &Likelihood<'_>, data: &ArimaData<'_>, orders: &ArimaOrder
 }
 
 fn nothing_left(orders: &ArimaOrders) -> Error {
-    let what = if orders.integrations() > 0 { "its differences are" } else { "its deviations from the constant are" };
+    let what = if orders.integrations() > 0 {
+        "its differences are"
+    } else {
+        "its deviations from the constant are"
+    };
     Error::undetermined(
         Vec::new(),
         format!("the output has no noise to describe: {what} zero; name other rows, or another output"),
     )
 }
 
-/// Whether a factor has a root on the unit circle, as far as so many values tell.
-fn on_circle(orders: &ArimaOrders, found: &Found, samples: f64) -> bool {
-    let own = found.parameters.len() - orders.parameters();
-    let factors = orders.factors(&found.parameters[own..]);
-    Factor::ALL.iter().zip(&factors).any(|(factor, monic)| {
-        let (_, rows) = orders.factor(*factor);
+/// Which parameters are of a factor with a root on the unit circle, as far as so many values tell.
+fn on_circle(orders: &ArimaOrders, parameters: &[f64], samples: f64) -> Vec<bool> {
+    let own = parameters.len() - orders.parameters();
+    let factors = orders.factors(&parameters[own..]);
+    let mut held = vec![false; own];
+    for (factor, monic) in Factor::ALL.iter().zip(&factors) {
+        let (count, rows) = orders.factor(*factor);
         let near = |distance: f64| distance * samples < ON_CIRCLE * rows as f64;
-        roots(monic).unwrap_or_default().iter().any(|root| near(1.0 - root.modulus()))
-    })
+        let any = roots(monic).unwrap_or_default().iter().any(|root| near(1.0 - root.modulus()));
+        held.extend(std::iter::repeat_n(any, count));
+    }
+    held
 }
 
 /// The rows of a segment with an expectation, and those before it that it needs.

@@ -39,7 +39,10 @@ impl StateSpaceDraft {
         let Common { estimate, validate, split, detrend, offsets } = common(options)?;
         let order = match options.order {
             Some(OrderOption::Arima(_)) => {
-                return Err(Error::argument("order", "p,d,q is of `model` arima; write it as N or A..B, such as 4 or 1..10"));
+                return Err(Error::argument(
+                    "order",
+                    "p,d,q is of `model` arima; write it as N or A..B, such as 4 or 1..10",
+                ));
             }
             Some(OrderOption::States(order)) => Some(order.first()..=order.last()),
             None => None,

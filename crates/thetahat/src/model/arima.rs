@@ -107,7 +107,9 @@ impl ArimaOrders {
             if season < 2 {
                 return Err(Error::argument(
                     "seasonal",
-                    format!("a season has two rows at least, and s is {season}; write P,D,Q,s, such as 0,1,1,12"),
+                    format!(
+                        "a season has two rows at least, and s is {season}; write P,D,Q,s, such as 0,1,1,12"
+                    ),
                 ));
             }
             if [p, d, q] == [0; 3] {
@@ -126,7 +128,9 @@ impl ArimaOrders {
         if longest > LARGEST {
             return Err(Error::argument(
                 "order",
-                format!("the model reaches {longest} rows back, and {LARGEST} is the most; lower the orders or s"),
+                format!(
+                    "the model reaches {longest} rows back, and {LARGEST} is the most; lower the orders or s"
+                ),
             ));
         }
         Ok(orders)
@@ -281,8 +285,9 @@ impl ArimaFactors {
 
     /// Checks factors that were read: that the polynomials of the model are their products.
     pub(super) fn check(&self, model: &PolynomialModel) -> Result<(), Error> {
-        let wrong =
-            |what: &str| Err(Error::report(format!("model.factors: {what}; the report was edited or damaged")));
+        let wrong = |what: &str| {
+            Err(Error::report(format!("model.factors: {what}; the report was edited or damaged")))
+        };
         let ArimaOrders { order, seasonal } = self.orders;
         if ArimaOrders::new(order, seasonal).as_ref() != Ok(&self.orders) {
             return wrong("the orders make no sense");

@@ -12,7 +12,9 @@ use super::warnings::warnings;
 use crate::Error;
 use crate::data::{Log, Offset, Record, Rows, Source, Split};
 use crate::estimate::{ArimaData, ArimaEstimate, Constant, Criteria, Procedure, arima};
-use crate::model::{ArimaFactors, ArimaOrders, Orders, Parameter, PolynomialModel, Signal, polynomial::product};
+use crate::model::{
+    ArimaFactors, ArimaOrders, Orders, Parameter, PolynomialModel, Signal, polynomial::product,
+};
 use crate::respond::arima::ArimaOnLog;
 use crate::select::Focus;
 use crate::validate::Part;
@@ -85,7 +87,11 @@ impl ArimaPlan {
         if !self.delays.is_empty() && self.delays.len() != self.inputs.len() {
             return Err(Error::argument(
                 "nk",
-                format!("{} numbers for {} inputs; give one for all or one for each", self.delays.len(), self.inputs.len()),
+                format!(
+                    "{} numbers for {} inputs; give one for all or one for each",
+                    self.delays.len(),
+                    self.inputs.len()
+                ),
             ));
         }
         if self.inputs.is_empty() && self.orders.parameters() == 0 && integrations == 0 {
@@ -233,7 +239,8 @@ fn model(
     let expanded = orders.expanded(own, true);
     let difference = orders.differencing();
     let d = product(&expanded.a, &difference);
-    let of = Orders::new(0, &vec![1; inputs], expanded.c.len() - 1, d.len() - 1, &vec![0; inputs], &plan.delays)?;
+    let of =
+        Orders::new(0, &vec![1; inputs], expanded.c.len() - 1, d.len() - 1, &vec![0; inputs], &plan.delays)?;
     let values = [&weights[lines..], &expanded.c[1..], &d[1..]].concat();
     // How these follow from the parameters: inputs as they are, C and D to first order.
     let slope = |place: usize| -> Vec<f64> {
@@ -262,14 +269,21 @@ fn model(
         }
         expanded
     });
-    let model =
-        PolynomialModel::from_parameters(&of, &values, covariance.as_deref(), found.noise_variance, sample_time)?;
-    let error = |place: usize| found.covariance.as_ref().map(|rows| rows[place][place].sqrt());
-    let parameters = names.iter().zip(&found.parameters).enumerate().map(|(place, (name, &value))| Parameter {
-        name: name.clone(),
-        value,
-        standard_error: error(place),
-    });
+    let model = PolynomialModel::from_parameters(
+        &of,
+        &values,
+        covariance.as_deref(),
+        found.noise_variance,
+        sample_time,
+    )?;
+    let error = |place: usize| {
+        found.covariance.as_ref().filter(|_| !found.held[place]).map(|rows| rows[place][place].sqrt())
+    };
+    let parameters = names
+        .iter()
+        .zip(&found.parameters)
+        .enumerate()
+        .map(|(place, (name, &value))| Parameter { name: name.clone(), value, standard_error: error(place) });
     let constant = if plan.has_constant() { weights[0] } else { 0.0 };
     let drift = if plan.trend { weights[lines - 1] } else { 0.0 };
     let signal = |name: &String, offset| Signal { name: name.clone(), offset };

@@ -76,7 +76,13 @@ impl ArimaProcess {
 
     /// The innovations of the values of a segment in these rows, which [`expected`](Self::expected) gave, and of
     /// columns beside it.
-    pub(crate) fn scan(&self, values: &[f64], columns: &[&[f64]], rows: Range<usize>, slopes: bool) -> Scanned {
+    pub(crate) fn scan(
+        &self,
+        values: &[f64],
+        columns: &[&[f64]],
+        rows: Range<usize>,
+        slopes: bool,
+    ) -> Scanned {
         if values[rows.clone()].iter().all(|value| !value.is_nan()) {
             let differenced = |values: &[f64]| self.differenced(values, &rows);
             let columns: Vec<Vec<f64>> = columns.iter().map(|column| differenced(column)).collect();

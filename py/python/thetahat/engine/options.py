@@ -117,7 +117,10 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
     for name, value in arguments.items():
         if value is None:
             continue
-        if name == "linear":
+        if name == "input":
+            # Channels by name, as they are.
+            found[name] = [text(name, one) for one in value]
+        elif name == "linear":
             found["no_linear"] = not flag(name, value)
         elif name == "terms" and isinstance(value, (list, tuple)):
             # The products themselves.

@@ -40,7 +40,7 @@ def arima(
         P, D, Q and s: the same over seasons, and the rows that a season has.
     nk : int, or one for each input, optional
         Samples from input to effect: 0, in the same row, unless said otherwise.
-    constant : bool or "auto", optional
+    constant : {"auto", "yes", "no"}, optional
         Whether the output has a level that is estimated, as its first parameter. By default it has one if it is not differenced.
     trend : bool, optional
         Whether it has a drift for each row that is estimated. Not where it is differenced more than once, which takes the drift too.
@@ -70,22 +70,34 @@ def arima(
 
     Examples
     --------
-    Monthly passengers of airlines, whose logarithm has seasons of a constant size (Box and Jenkins, series G):
+    Monthly passengers of airlines (Box and Jenkins, series G), whose seasons grow with their level: the logarithm is fitted.
 
     >>> import numpy as np
     >>> import thetahat as th
-    >>> month = np.arange(120)
-    >>> rng = np.random.default_rng(0)
-    >>> passengers = np.exp(5 + 0.01 * month + 0.2 * np.sin(2 * np.pi * month / 12) + 0.02 * rng.normal(size=120).cumsum())
-    >>> model = th.arima(th.Log(np.log(passengers), sample_time=1), order=(0, 1, 1), seasonal=(0, 1, 1, 12))
-    >>> model.parameter_names
-    ['ma1', 'sma12']
+    >>> passengers = np.array(
+    ...     "112 118 132 129 121 135 148 148 136 119 104 118 115 126 141 135 125 149 170 170 158 133 114 140 "
+    ...     "145 150 178 163 172 178 199 199 184 162 146 166 171 180 193 181 183 218 230 242 209 191 172 194 "
+    ...     "196 196 236 235 229 243 264 272 237 211 180 201 204 188 235 227 234 264 302 293 259 229 203 229 "
+    ...     "242 233 267 269 270 315 364 347 312 274 237 278 284 277 317 313 318 374 413 405 355 306 271 306 "
+    ...     "315 301 356 348 355 422 465 467 404 347 305 336 340 318 362 348 363 435 491 505 404 359 310 337 "
+    ...     "360 342 406 396 420 472 548 559 463 407 362 405 417 391 419 461 472 535 622 606 508 461 390 432".split(),
+    ...     dtype=float,
+    ... )
+    >>> log = th.Log(np.log(passengers), sample_time=1)
+    >>> model = th.arima(log, order=(0, 1, 1), seasonal=(0, 1, 1, 12))
+    >>> {name: round(float(value), 3) for name, value in zip(model.parameter_names, model.parameters)}
+    {'ma1': -0.402, 'sma12': -0.557}
+    >>> round(model.log_likelihood, 2), round(model.aic, 2)
+    (244.7, -483.39)
 
-    Forecasts are of the logarithm; the ends of its intervals, as exponentials, are those of the passengers.
+    Forecasts and their intervals are of the logarithm too; the exponentials of their ends are those of the passengers.
 
-    >>> ahead = model.forecast(th.Log(np.log(passengers), sample_time=1), steps=12)
-    >>> np.exp(ahead.values).shape
-    (12,)
+    >>> ahead = model.forecast(log, steps=3)
+    >>> np.exp(ahead.values).round()
+    array([450., 426., 479.])
+    >>> np.exp(ahead.interval(0.95)).round()
+    array([[419., 391., 436.],
+           [484., 463., 526.]])
     """
     for name, values, count in (("order", order, 3), ("seasonal", seasonal, 4)):
         if values is not None and (isinstance(values, str) or len(values) != count):

@@ -2,17 +2,19 @@
 
 use std::ops::Range;
 
-use thetahat_core::nalgebra::{Cholesky, Complex, ComplexField, DMatrix};
+use thetahat_core::nalgebra::{Cholesky, ComplexField, DMatrix};
 use thetahat_numerics::optimize::Objective;
 use thetahat_numerics::regression::condition;
 
 use super::{ArimaData, expected};
-use crate::model::polynomial::{Roots, is_stable, multiply_out};
+use crate::model::polynomial::{is_stable, multiply_out, roots};
 use crate::model::{ArimaOrders, Factor};
 use crate::respond::arima::ArimaProcess;
 
 /// Roots of factors are inside this circle.
 const INSIDE: f64 = 1.0 - 1e-6;
+/// The step of differences of the gradient, in standard errors.
+const STEP: f64 = 1e-3;
 /// A root that a step takes out of the unit circle is moved back to this fraction of its distance before.
 const NEARER: f64 = 0.2;
 
@@ -40,7 +42,6 @@ pub(super) struct Likelihood<'a> {
     samples: usize,
     parameters: Vec<f64>,
     squares: f64,
-    logarithms: f64,
     matrix: Vec<f64>,
     right: Vec<f64>,
 }
@@ -64,7 +65,6 @@ impl<'a> Likelihood<'a> {
             columns: data.columns.len(),
             parameters: vec![0.0; size],
             squares: 0.0,
-            logarithms: 0.0,
             matrix: vec![0.0; size * size],
             right: vec![0.0; size],
         }
@@ -83,7 +83,13 @@ impl<'a> Likelihood<'a> {
     pub(super) fn differenced(&self) -> Vec<(Vec<f64>, Vec<Vec<f64>>)> {
         let delta = self.orders.differencing();
         let of = |values: &[f64], rows: &Range<usize>| -> Vec<f64> {
-            let at = |row: usize| delta.iter().enumerate().filter(|(_, delta)| **delta != 0.0).map(move |(lag, delta)| (row - lag, *delta));
+            let at = |row: usize| {
+                delta
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, delta)| **delta != 0.0)
+                    .map(move |(lag, delta)| (row - lag, *delta))
+            };
             rows.clone().map(|row| at(row).map(|(row, delta)| delta * values[row]).sum()).collect()
         };
         let section = |section: &Section<'_>| {
@@ -94,13 +100,15 @@ impl<'a> Likelihood<'a> {
     }
 
     /// The inverse of the matrix of the normal equations, and the condition number of a psi with this Gram matrix; none
-    /// where it is singular to rounding.
-    pub(super) fn inverse(&self) -> Option<(DMatrix<f64>, f64)> {
-        let size = self.right.len();
+    /// where it is singular to rounding. Parameters that are `held` are taken for known: theirs are zeros.
+    pub(super) fn inverse(&self, held: &[bool]) -> Option<(DMatrix<f64>, f64)> {
+        let whole = self.right.len();
+        let free: Vec<usize> = (0..whole).filter(|place| !held[*place]).collect();
+        let size = free.len();
         if size == 0 {
-            return Some((DMatrix::zeros(0, 0), 1.0));
+            return Some((DMatrix::zeros(whole, whole), 1.0));
         }
-        let matrix = DMatrix::from_row_slice(size, size, &self.matrix);
+        let matrix = DMatrix::from_fn(size, size, |i, j| self.matrix[free[i] * whole + free[j]]);
         let scales = matrix.diagonal().map(f64::sqrt);
         if !scales.iter().all(|scale| *scale > 0.0) {
             return None;
@@ -109,8 +117,54 @@ impl<'a> Likelihood<'a> {
         let factor = Cholesky::new(unit)?;
         let condition = condition(&factor.l().transpose(), self.samples)?;
         let inverse = factor.inverse();
-        let covariance = DMatrix::from_fn(size, size, |i, j| inverse[(i, j)] / scales[i] / scales[j]);
+        let mut covariance = DMatrix::zeros(whole, whole);
+        for i in 0..size {
+            for j in 0..size {
+                covariance[(free[i], free[j])] = inverse[(i, j)] / scales[i] / scales[j];
+            }
+        }
         Some((covariance, condition))
+    }
+
+    /// The information that was observed, half the second derivatives of the cost, in the place of that expected: of
+    /// differences of the gradient, some thousandths of these standard errors to each side. Stays as it is where it is
+    /// not positive definite, or a step leaves the region of stability. Efron and Hinkley (Biometrika 65 (1978)) have why
+    /// it is the better one.
+    pub(super) fn observe(&mut self, at: &[f64], standard_errors: &[f64]) {
+        let size = at.len();
+        let expected = std::mem::take(&mut self.matrix);
+        self.matrix = vec![0.0; size * size];
+        let mut observed = vec![0.0; size * size];
+        let mut gradient = |place: usize, step: f64| -> Option<Vec<f64>> {
+            self.parameters.copy_from_slice(at);
+            self.parameters[place] += step;
+            if !self.is_inside() {
+                return None;
+            }
+            self.linearize().ok()?;
+            Some(self.right.clone())
+        };
+        let mut all = true;
+        // Parameters without one are held.
+        for (place, error) in standard_errors.iter().enumerate().filter(|(_, error)| **error > 0.0) {
+            let step = STEP * error;
+            let Some((up, down)) = gradient(place, step).zip(gradient(place, -step)) else {
+                all = false;
+                break;
+            };
+            for (other, (up, down)) in up.iter().zip(&down).enumerate() {
+                // Half of each from both sides of the diagonal.
+                let slope = (down - up) / (4.0 * step);
+                observed[place * size + other] += slope;
+                observed[other * size + place] += slope;
+            }
+        }
+        for place in (0..size).filter(|place| standard_errors[*place] == 0.0) {
+            observed[place * size + place] = 1.0;
+        }
+        let definite = all && Cholesky::new(DMatrix::from_row_slice(size, size, &observed)).is_some();
+        self.parameters.copy_from_slice(at);
+        self.matrix = if definite { observed } else { expected };
     }
 
     /// z of a section: its values less what the columns say of them.
@@ -122,45 +176,33 @@ impl<'a> Likelihood<'a> {
         noise
     }
 
-    /// Makes each factor stable whose roots are not: those of a moving average are reflected at the unit circle, which
-    /// leaves the likelihood as it is, those of an autoregression move back to it, nearer than those of `from`.
-    pub(super) fn drawn_in(orders: &ArimaOrders, from: Option<&[f64]>, trial: &mut [f64]) -> bool {
-        let factors = orders.factors(trial);
-        let before = from.map(|from| orders.factors(from));
+    /// Whether all factors are stable and invertible.
+    fn is_inside(&self) -> bool {
+        let mut scratch = Vec::new();
+        let factors = self.orders.factors(&self.parameters[self.columns..]);
+        factors.iter().all(|monic| is_stable(monic, &mut scratch))
+    }
+
+    /// Moves the roots of each factor of `trial` that is not stable back into the unit circle, nearer to it than those at
+    /// `from`. A moving average is not reflected there: where the likelihood is largest on the circle, that ends halfway.
+    fn moved_in(&self, from: &[f64], trial: &mut [f64]) -> bool {
+        let orders = &self.orders;
+        let (before, after) = (orders.factors(from), orders.factors(trial));
         let mut place = 0;
         let (mut scratch, mut product) = (Vec::new(), Vec::new());
-        for (number, (factor, monic)) in Factor::ALL.into_iter().zip(&factors).enumerate() {
+        for ((factor, before), monic) in Factor::ALL.into_iter().zip(&before).zip(&after) {
             let count = monic.len() - 1;
-            if !is_stable(monic, &mut scratch) {
-                let mut memory = Roots::with_capacity(count + 1);
-                let outermost = |monic: &[f64], memory: &mut Roots| {
-                    Some(memory.of(monic)?.iter().fold(0.0_f64, |most, root| most.max(root.modulus())))
-                };
-                let radius = match &before {
-                    Some(before) => {
-                        let Some(outermost) = outermost(&before[number], &mut memory) else { return false };
-                        1.0 - NEARER * (1.0 - outermost)
-                    }
-                    None => INSIDE,
-                };
-                let Some(found) = memory.of(monic) else { return false };
-                let moved = |root: &Complex<f64>| {
-                    let modulus = root.modulus();
-                    if modulus < 1.0 {
-                        *root
-                    } else if factor.is_autoregressive() {
-                        *root * (radius.min(INSIDE) / modulus)
-                    } else {
-                        *root * ((1.0 / modulus).min(INSIDE) / modulus)
-                    }
-                };
-                multiply_out(found.iter().map(moved), &mut product);
-                let sign = if factor.is_autoregressive() { -1.0 } else { 1.0 };
-                for (value, own) in trial[place..place + count].iter_mut().zip(&product[1..]) {
-                    *value = sign * own.re;
-                }
-            }
+            let own = &mut trial[place..place + count];
             place += count;
+            if is_stable(monic, &mut scratch) {
+                continue;
+            }
+            let (Some(were), Some(found)) = (roots(before), roots(monic)) else { return false };
+            let outermost = were.iter().fold(0.0_f64, |most, root| most.max(root.modulus()));
+            let radius = (1.0 - NEARER * (1.0 - outermost)).min(INSIDE);
+            multiply_out(found.iter().map(|root| *root * (radius / root.modulus()).min(1.0)), &mut product);
+            let sign = if factor.is_autoregressive() { -1.0 } else { 1.0 };
+            own.iter_mut().zip(&product[1..]).for_each(|(value, product)| *value = sign * product.re);
         }
         orders.factors(trial).iter().all(|monic| is_stable(monic, &mut scratch))
     }
@@ -179,11 +221,10 @@ impl Objective for Likelihood<'_> {
 
     fn evaluate(&mut self, parameters: &[f64]) -> Result<f64, Unusable> {
         self.parameters.copy_from_slice(parameters);
-        let own = &parameters[self.columns..];
-        let mut scratch = Vec::new();
-        if !self.orders.factors(own).iter().all(|monic| is_stable(monic, &mut scratch)) {
+        if !self.is_inside() {
             return Err(Unusable::Unstable);
         }
+        let own = &parameters[self.columns..];
         let process = ArimaProcess::new(&self.orders, own, false).ok_or(Unusable::Unstable)?;
         let (mut squares, mut logarithms) = (0.0, 0.0);
         for section in &self.sections {
@@ -193,7 +234,7 @@ impl Objective for Likelihood<'_> {
                 logarithms += f.ln();
             }
         }
-        (self.squares, self.logarithms) = (squares, logarithms);
+        self.squares = squares;
         let cost = squares * (logarithms / self.samples as f64).exp();
         if cost.is_finite() { Ok(cost) } else { Err(Unusable::Overflow) }
     }
@@ -210,8 +251,7 @@ impl Objective for Likelihood<'_> {
     fn linearize(&mut self) -> Result<f64, Unusable> {
         let (size, columns) = (self.right.len(), self.columns);
         let samples = self.samples as f64;
-        let scale = (self.logarithms / samples).exp();
-        let cost = self.squares * scale;
+        let (mut squares, mut logarithms) = (0.0, 0.0);
         self.matrix.fill(0.0);
         self.right.fill(0.0);
         let own = size - columns;
@@ -226,18 +266,20 @@ impl Objective for Likelihood<'_> {
                 if v.is_nan() {
                     continue;
                 }
+                squares += v * v / f;
+                logarithms += f.ln();
                 let (of_columns, of_factors) = slopes.split_at_mut(columns);
                 of_columns.iter_mut().zip(&found.columns).for_each(|(slope, column)| *slope = -column[t]);
                 of_factors.iter_mut().zip(&found.error_slopes).for_each(|(slope, own)| *slope = own[t]);
                 relative.iter_mut().zip(&found.variance_slopes).for_each(|(slope, own)| *slope = own[t] / f);
                 for (i, slope) in slopes.iter().enumerate() {
-                    let weighted = scale * slope / f;
+                    let weighted = slope / f;
                     self.right[i] -= v * weighted;
                     let row = self.matrix[i * size..][..=i].iter_mut().zip(&slopes);
                     row.for_each(|(sum, other)| *sum += weighted * other);
                 }
                 for (i, slope) in relative.iter().enumerate() {
-                    self.right[columns + i] += 0.5 * scale * v * v / f * slope;
+                    self.right[columns + i] += 0.5 * v * v / f * slope;
                     logarithm_slopes[i] += slope;
                     let row = variances[i * own..][..=i].iter_mut().zip(&relative);
                     row.for_each(|(sum, other)| *sum += slope * other);
@@ -245,14 +287,18 @@ impl Objective for Likelihood<'_> {
             }
         }
         for i in 0..own {
-            self.right[columns + i] -= 0.5 * cost / samples * logarithm_slopes[i];
+            self.right[columns + i] -= 0.5 * squares / samples * logarithm_slopes[i];
             for j in 0..=i {
                 let both = variances[i * own + j] - logarithm_slopes[i] * logarithm_slopes[j] / samples;
-                self.matrix[(columns + i) * size + columns + j] += 0.5 * cost / samples * both;
+                self.matrix[(columns + i) * size + columns + j] += 0.5 * squares / samples * both;
             }
         }
+        // All of it is in units of S so far.
+        let scale = (logarithms / samples).exp();
         for i in 0..size {
-            for j in 0..i {
+            self.right[i] *= scale;
+            for j in 0..=i {
+                self.matrix[i * size + j] *= scale;
                 self.matrix[j * size + i] = self.matrix[i * size + j];
             }
         }
@@ -273,6 +319,6 @@ impl Objective for Likelihood<'_> {
 
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
         let columns = self.columns;
-        Self::drawn_in(&self.orders, Some(&from[columns..]), &mut trial[columns..])
+        self.moved_in(&from[columns..], &mut trial[columns..])
     }
 }

@@ -39,10 +39,13 @@ pub(super) fn begin(likelihood: &Likelihood<'_>, data: &ArimaData<'_>) -> Result
         }
     }
     let left: Vec<Vec<f64>> = sections.into_iter().map(|(values, _)| values).collect();
-    let whole = |values: &[f64]| values.iter().filter(|value| !value.is_nan()).map(|value| value * value).sum::<f64>();
+    let whole = |values: &[f64]| {
+        values.iter().filter(|value| !value.is_nan()).map(|value| value * value).sum::<f64>()
+    };
     let energy: f64 = left.iter().map(|values| whole(values)).sum();
     let size = |values: &Vec<f64>| values.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let level: f64 = data.output.iter().filter(|value| !value.is_nan()).fold(0.0, |most, value| most.max(value.abs()));
+    let level: f64 =
+        data.output.iter().filter(|value| !value.is_nan()).fold(0.0, |most, value| most.max(value.abs()));
     // What rounding leaves of a constant.
     let rounding = 64.0 * f64::EPSILON * level;
     let energy = if left.iter().map(size).fold(0.0, f64::max) <= rounding { 0.0 } else { energy };
@@ -60,10 +63,16 @@ pub(super) fn begin(likelihood: &Likelihood<'_>, data: &ArimaData<'_>) -> Result
     {
         add("hannan-rissanen", own);
     }
-    add("small", Factor::ALL.iter().flat_map(|factor| {
-        let value = if factor.is_autoregressive() { SMALL } else { -SMALL / 2.0 };
-        std::iter::repeat_n(value, orders.factor(*factor).0)
-    }).collect());
+    add(
+        "small",
+        Factor::ALL
+            .iter()
+            .flat_map(|factor| {
+                let value = if factor.is_autoregressive() { SMALL } else { -SMALL / 2.0 };
+                std::iter::repeat_n(value, orders.factor(*factor).0)
+            })
+            .collect(),
+    );
     Ok(Begin { energy, starts })
 }
 
@@ -92,7 +101,10 @@ fn regression(
     for j in 0..count {
         let norm = left.column(j).norm();
         // What differencing leaves of a column that is large and hardly changes is rounding.
-        let level = data.columns[j].iter().filter(|value| !value.is_nan()).fold(0.0_f64, |most, value| most.max(value.abs()));
+        let level = data.columns[j]
+            .iter()
+            .filter(|value| !value.is_nan())
+            .fold(0.0_f64, |most, value| most.max(value.abs()));
         let rounding = 64.0 * f64::EPSILON * level * (target.len() as f64).sqrt();
         if norm.is_nan() || norm <= rounding.max(DEPENDENT * matrix.column(j).norm()) {
             let why = match orders.integrations() {
@@ -125,11 +137,14 @@ fn hannan_rissanen(sections: &[Vec<f64>], orders: &ArimaOrders, samples: usize) 
         (1..=count).map(move |lag| lag * rows)
     };
     let longest = Factor::ALL.into_iter().flat_map(lags).max().unwrap_or(1);
-    let moving = Factor::ALL.into_iter().any(|factor| !factor.is_autoregressive() && orders.factor(factor).0 > 0);
+    let moving =
+        Factor::ALL.into_iter().any(|factor| !factor.is_autoregressive() && orders.factor(factor).0 > 0);
     let order = if moving { (longest + longest.max(8)).min(samples / 4).max(1) } else { 0 };
     let errors = autoregressive_errors(sections, order);
-    let all: Vec<(bool, usize)> =
-        Factor::ALL.into_iter().flat_map(|factor| lags(factor).map(move |lag| (factor.is_autoregressive(), lag))).collect();
+    let all: Vec<(bool, usize)> = Factor::ALL
+        .into_iter()
+        .flat_map(|factor| lags(factor).map(move |lag| (factor.is_autoregressive(), lag)))
+        .collect();
     let size = all.len();
     let mut gram = DMatrix::zeros(size, size);
     let mut right = DVector::zeros(size);
@@ -161,7 +176,11 @@ fn hannan_rissanen(sections: &[Vec<f64>], orders: &ArimaOrders, samples: usize) 
 /// The errors of an autoregression of some order, by the equations of Yule and Walker.
 fn autoregressive_errors(sections: &[Vec<f64>], order: usize) -> Vec<Vec<f64>> {
     let product = |lag: usize| -> f64 {
-        sections.iter().filter(|w| w.len() > lag).map(|w| w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>()).sum()
+        sections
+            .iter()
+            .filter(|w| w.len() > lag)
+            .map(|w| w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum::<f64>())
+            .sum()
     };
     let r: Vec<f64> = (0..=order).map(product).collect();
     // Levinson and Durbin.
@@ -192,7 +211,10 @@ fn inside(orders: &ArimaOrders, parameters: &mut [f64]) {
         let own = &mut parameters[place..place + count];
         match roots(monic) {
             Some(found) if found.iter().any(|root| root.modulus() > INSIDE) => {
-                multiply_out(found.iter().map(|root| *root * (INSIDE / root.modulus()).min(1.0)), &mut product);
+                multiply_out(
+                    found.iter().map(|root| *root * (INSIDE / root.modulus()).min(1.0)),
+                    &mut product,
+                );
                 let sign = if factor.is_autoregressive() { -1.0 } else { 1.0 };
                 own.iter_mut().zip(&product[1..]).for_each(|(value, product)| *value = sign * product.re);
             }

@@ -31,7 +31,8 @@ fn process(orders: &ArimaOrders, parameters: &[f64], rows: usize) -> Vec<f64> {
 
 fn data<'a>(output: &'a [f64], columns: Vec<Vec<f64>>, orders: &ArimaOrders) -> ArimaData<'a> {
     let nk = vec![0; columns.len()];
-    ArimaData { output, columns, segments: vec![0..output.len()], names: orders.all_names(false, false, &nk) }
+    let segments = std::iter::once(0..output.len()).collect();
+    ArimaData { output, columns, segments, names: orders.all_names(false, false, &nk) }
 }
 
 fn found(data: &ArimaData<'_>, orders: &ArimaOrders) -> Result<ArimaEstimate, Error> {
@@ -95,10 +96,16 @@ fn parameters_of_a_simulated_process_are_found() {
 #[test]
 fn a_difference_too_many_is_told() {
     let orders = ArimaOrders::new([0, 1, 1], None).unwrap();
-    let y = noise(200);
-    let found = found(&data(&y, Vec::new(), &orders), &orders).unwrap();
-    assert!(found.parameters[0] < -0.99, "{:?}", found.parameters);
-    assert!(found.outcome.search.stability_bound);
+    // Of some series of white noise the likelihood is largest on the circle, of others near to it.
+    let told = (0..10).filter(|part| {
+        let y = noise(1500)[part * 150..(part + 1) * 150].to_vec();
+        let found = found(&data(&y, Vec::new(), &orders), &orders).unwrap();
+        assert_eq!(found.outcome.search.stopped, Stopped::Converged);
+        assert!(found.parameters[0] < -0.9, "{:?}", found.parameters);
+        assert_eq!(found.held, [found.outcome.search.stability_bound]);
+        found.held[0] && found.parameters[0] < -0.999
+    });
+    assert!(told.count() >= 4);
 }
 
 #[test]

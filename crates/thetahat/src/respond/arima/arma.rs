@@ -131,9 +131,10 @@ impl Arma {
         for i in (0..m).rev() {
             for j in (0..=i).rev() {
                 let (ai, aj, ci, cj) = (self.a[i + 1], self.a[j + 1], self.c[i + 1], self.c[j + 1]);
-                let value = at(&p, i + 1, j + 1) - aj * below(i) - ai * below(j) + ai * aj * self.variance + ci * cj
-                    - ai * cj
-                    - aj * ci;
+                let value =
+                    at(&p, i + 1, j + 1) - aj * below(i) - ai * below(j) + ai * aj * self.variance + ci * cj
+                        - ai * cj
+                        - aj * ci;
                 (p[i * m + j], p[j * m + i]) = (value, value);
             }
         }
@@ -152,7 +153,9 @@ impl Arma {
                 let part = |i: usize, j: usize| {
                     let (a, da) = (self.a[j + 1], slope.a[j + 1]);
                     let (other, c, dc) = (self.a[i + 1], self.c[i + 1], slope.c[i + 1]);
-                    -da * below(&self.column, i) - a * below(&slope.column, i) + da * other * self.variance - da * c - a * dc
+                    -da * below(&self.column, i) - a * below(&slope.column, i) + da * other * self.variance
+                        - da * c
+                        - a * dc
                         + dc * self.c[j + 1]
                 };
                 let value = at(&p, i + 1, j + 1)

@@ -54,7 +54,13 @@ pub(super) struct Filter {
 
 impl Filter {
     /// The filter after as many values as Delta has lags, of z and of columns beside it.
-    pub(super) fn new(arma: &Arma, difference: &[f64], first: &[f64], columns: &[Vec<f64>], slopes: bool) -> Self {
+    pub(super) fn new(
+        arma: &Arma,
+        difference: &[f64],
+        first: &[f64],
+        columns: &[Vec<f64>],
+        slopes: bool,
+    ) -> Self {
         let a = product(&arma.a, difference);
         let order = a.len() - 1;
         let padded = |polynomial: &[f64]| {
@@ -166,9 +172,8 @@ impl Filter {
 
     fn gain_slope(&self, slope: &Slope, top: f64) -> Vec<f64> {
         let below = column(&slope.p, self.order);
-        let entry = |i: usize| {
-            below[i] - slope.a[i + 1] * (top + 1.0) - self.a[i + 1] * slope.p[0] + slope.c[i + 1]
-        };
+        let entry =
+            |i: usize| below[i] - slope.a[i + 1] * (top + 1.0) - self.a[i + 1] * slope.p[0] + slope.c[i + 1];
         (0..self.order).map(entry).collect()
     }
 
@@ -212,11 +217,12 @@ impl Filter {
                 let (aj, daj) = (a[j + 1], a_slope[j + 1]);
                 let (gj, dgj) = (c[j + 1] - aj, c_slope[j + 1] - daj);
                 let inner = if i + 1 < m { p[(i + 1) * m + j + 1] } else { 0.0 };
-                let mut value = inner - daj * below[i] - aj * below_slope[i] - dai * below[j] - ai * below_slope[j]
-                    + (dai * aj + ai * daj) * top
-                    + ai * aj * top_slope
-                    + dgi * gj
-                    + gi * dgj;
+                let mut value =
+                    inner - daj * below[i] - aj * below_slope[i] - dai * below[j] - ai * below_slope[j]
+                        + (dai * aj + ai * daj) * top
+                        + ai * aj * top_slope
+                        + dgi * gj
+                        + gi * dgj;
                 if !gain.is_empty() {
                     let own = gain[i] * gain[j] / f;
                     value -= (gain_slope[i] * gain[j] + gain[i] * gain_slope[j] - own * f_slope) / f;
@@ -296,7 +302,8 @@ impl Filter {
             return 0.0;
         }
         let row = |row: &[f64]| row.iter().zip(seen).map(|(p, seen)| p * seen).sum::<f64>();
-        let spread = self.p.chunks_exact(self.order).zip(seen).map(|(own, seen)| seen * row(own)).sum::<f64>();
+        let spread =
+            self.p.chunks_exact(self.order).zip(seen).map(|(own, seen)| seen * row(own)).sum::<f64>();
         spread.max(0.0)
     }
 

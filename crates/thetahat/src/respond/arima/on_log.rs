@@ -63,15 +63,14 @@ impl<'l> ArimaOnLog<'l> {
         let orders = &factors.orders;
         let own = factors.parameters.len() - orders.parameters();
         let values: Vec<f64> = factors.parameters[own..].iter().map(|parameter| parameter.value).collect();
-        let process = ArimaProcess::new(orders, &values, false)
-            .ok_or_else(|| Error::report("model.factors: they are not stationary; the report was edited or damaged"))?;
+        let process = ArimaProcess::new(orders, &values, false).ok_or_else(|| {
+            Error::report("model.factors: they are not stationary; the report was edited or damaged")
+        })?;
         let inputs: Vec<String> = model.inputs.iter().map(|input| input.name.clone()).collect();
         let record = log.driven_record(&inputs, &model.output.name, rows)?;
         let mut noise = record.output.to_vec();
         let mut expected = Vec::new();
-        for row in 0..noise.len() {
-            noise[row] -= driven(model, &record.inputs, row);
-        }
+        noise.iter_mut().enumerate().for_each(|(row, noise)| *noise -= driven(model, &record.inputs, row));
         for (segment, past) in record.segments.iter().zip(&record.past) {
             let first = (segment.start - past + delay(model)).min(segment.end);
             if let Some(rows) = ArimaProcess::expected(&noise[first..segment.end], orders.differences()) {
@@ -259,11 +258,19 @@ impl OnLog for ArimaOnLog<'_> {
         let mut filter = self.filter(own);
         self.noise[own.rows.clone()].iter().for_each(|value| Self::see(&mut filter, *value));
         let (values, variances) = filter.forecast(known);
-        let add = |(step, value): (usize, &f64)| value + driven(self.model, &self.record.inputs, first + step);
+        let add =
+            |(step, value): (usize, &f64)| value + driven(self.model, &self.record.inputs, first + step);
         let deviation = |variance: &f64| (self.model.noise_variance * variance).sqrt();
-        Ok(Some((first, vec![Forecast {
-            values: if driving.is_empty() { values } else { values.iter().enumerate().map(add).collect() },
-            standard_deviations: variances.iter().map(deviation).collect(),
-        }])))
+        Ok(Some((
+            first,
+            vec![Forecast {
+                values: if driving.is_empty() {
+                    values
+                } else {
+                    values.iter().enumerate().map(add).collect()
+                },
+                standard_deviations: variances.iter().map(deviation).collect(),
+            }],
+        )))
     }
 }

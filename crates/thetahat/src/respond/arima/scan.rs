@@ -13,137 +13,168 @@
 //! only the coefficients that are not zero cost anything.
 
 use super::Scanned;
-use super::arma::{Arma, Terms, terms};
+use super::arma::{Arma, ArmaSlopes, Terms, terms};
 
 /// The filter stays as it is where the covariance would change by less than this, in units of var e.
-const SETTLED: f64 = 1e-24;
+const SETTLED: f64 = 1e-18;
 /// After so many samples it is looked at again.
 const EVERY: usize = 8;
 
-/// x <- T x, without its part of A: moves up by one.
-fn shift(x: &mut [f64]) {
-    let last = x.len() - 1;
-    x.copy_within(1.., 0);
-    x[last] = 0.0;
+/// The state, the gain and L, of which the first is moved up in each step: one zero more than they have entries.
+struct Moving {
+    x: Vec<f64>,
+    m: Vec<f64>,
+    l: Vec<f64>,
 }
 
-/// x <- x - factor A.
-fn subtract(x: &mut [f64], a: &Terms, factor: f64) {
-    for (lag, a) in a {
-        x[lag - 1] -= a * factor;
+impl Moving {
+    fn new(gain: &[f64]) -> Self {
+        let order = gain.len();
+        let mut l = gain.to_vec();
+        l.push(0.0);
+        Self { x: vec![0.0; order + 1], m: gain.to_vec(), l }
     }
-}
-
-/// x <- x + factor y.
-fn add(x: &mut [f64], y: &[f64], factor: f64) {
-    x.iter_mut().zip(y).for_each(|(x, y)| *x += factor * y);
 }
 
 /// What changes with a parameter.
 struct Slope {
     a: Terms,
     c: Terms,
-    x: Vec<f64>,
-    m: Vec<f64>,
-    l: Vec<f64>,
+    own: Moving,
     f: f64,
     scale: f64,
 }
 
+/// A step of the filter: what all that it moves has in common.
+struct Step<'s> {
+    a: &'s Terms,
+    /// v/f, the first entry of x, and z.
+    k: f64,
+    first: f64,
+    z: f64,
+    /// f of this sample and of the next, X, X z, and z/f of the next.
+    f: f64,
+    next: f64,
+    scale: f64,
+    scaled: f64,
+    weight: f64,
+    /// M before, M after, and T L.
+    before: &'s [f64],
+    after: &'s [f64],
+    h: &'s [f64],
+}
+
+impl Slope {
+    /// Moves on by a step. Gives dv and df of the sample.
+    fn step(&mut self, step: &Step<'_>) -> (f64, f64) {
+        let &Step { k, first, z, f, next, scale, scaled, weight, .. } = step;
+        let Moving { x, m, l } = &mut self.own;
+        let (x_first, z_slope) = (x[0], l[0]);
+        let (v_slope, f_before) = (-x_first, self.f);
+        let k_slope = (v_slope - k * f_before) / f;
+        let f_slope = f_before + 2.0 * z * z_slope * scale + z * z * self.scale;
+        let weight_slope = (z_slope - weight * f_slope) / next;
+        let scaled_slope = self.scale * z + scale * z_slope;
+        let order = m.len();
+        let (x, l) = (&mut x[..=order], &mut l[..=order]);
+        let (before, after, h) = (&step.before[..order], &step.after[..order], &step.h[..order]);
+        for i in 0..order {
+            let moved = l[i + 1];
+            x[i] = x[i + 1] + m[i] * k + before[i] * k_slope;
+            m[i] += moved * scaled + h[i] * scaled_slope;
+            l[i] = moved - m[i] * weight - after[i] * weight_slope;
+        }
+        let mut subtract = |terms: &Terms, of_x: f64, of_l: f64| {
+            for (lag, a) in terms {
+                x[lag - 1] -= a * of_x;
+                m[lag - 1] -= a * of_l * scaled;
+                l[lag - 1] -= a * of_l * (1.0 - scaled * weight);
+            }
+        };
+        subtract(&self.a, first, z);
+        subtract(step.a, x_first, z_slope);
+        self.scale = self.scale * next / f + scale * (f_slope - next / f * f_before) / f;
+        self.f = f_slope;
+        (v_slope, f_before)
+    }
+
+    fn new(arma: &Arma, slope: &ArmaSlopes) -> Self {
+        Self {
+            a: terms(&slope.a),
+            c: terms(&slope.c),
+            own: Moving::new(&arma.first_gain_slope(slope)),
+            f: slope.variance,
+            scale: slope.variance / (arma.variance * arma.variance),
+        }
+    }
+}
+
 /// The innovations of `w`, what the filter makes of `columns`, and, with slopes, their derivatives.
 pub(super) fn scan(arma: &Arma, w: &[f64], columns: &[Vec<f64>], with_slopes: bool) -> Scanned {
-    let rows = w.len();
+    let (rows, order) = (w.len(), arma.order);
     let a = terms(&arma.a);
     let slopes = if with_slopes { &arma.slopes[..] } else { &[] };
     let mut found = Scanned::new(rows, columns.len(), slopes.len());
-    let mut m = arma.first_gain();
-    let mut f = arma.variance;
-    let mut l = m.clone();
-    let mut scale = -1.0 / f;
-    let mut x = vec![0.0; arma.order];
-    let mut others = vec![vec![0.0; arma.order]; columns.len()];
-    let mut slopes: Vec<Slope> = slopes
-        .iter()
-        .map(|slope| {
-            let gain = arma.first_gain_slope(slope);
-            Slope {
-                a: terms(&slope.a),
-                c: terms(&slope.c),
-                x: x.clone(),
-                l: gain.clone(),
-                m: gain,
-                f: slope.variance,
-                scale: slope.variance / (f * f),
-            }
-        })
-        .collect();
+    let Moving { mut x, m: mut before, mut l } = Moving::new(&arma.first_gain());
+    let (mut f, mut scale) = (arma.variance, -1.0 / arma.variance);
+    let (mut after, mut h) = (vec![0.0; order], vec![0.0; order]);
+    let mut others = vec![vec![0.0; order + 1]; columns.len()];
+    let mut slopes: Vec<Slope> = slopes.iter().map(|slope| Slope::new(arma, slope)).collect();
     let mut end = rows;
-    for t in 0..rows {
-        if t >= end {
-            break;
-        }
-        let v = w[t] - x[0];
-        let k = v / f;
-        found.errors[t] = v;
-        found.variances[t] = f;
+    let mut t = 0;
+    while t < end {
         let (z, first) = (l[0], x[0]);
-        // h = T L, in the place of L.
-        shift(&mut l);
-        subtract(&mut l, &a, z);
-        let next = f + z * z * scale;
-        let weight = z / next;
-        for (slope, (errors, variances)) in
-            slopes.iter_mut().zip(found.error_slopes.iter_mut().zip(&mut found.variance_slopes))
-        {
-            let v_slope = -slope.x[0];
-            errors[t] = v_slope;
-            variances[t] = slope.f;
-            let k_slope = (v_slope - k * slope.f) / f;
-            let x_first = slope.x[0];
-            shift(&mut slope.x);
-            subtract(&mut slope.x, &slope.a, first);
-            subtract(&mut slope.x, &a, x_first);
-            add(&mut slope.x, &slope.m, k);
-            add(&mut slope.x, &m, k_slope);
-            let z_slope = slope.l[0];
-            shift(&mut slope.l);
-            subtract(&mut slope.l, &slope.a, z);
-            subtract(&mut slope.l, &a, z_slope);
-            let f_slope = slope.f + 2.0 * z * z_slope * scale + z * z * slope.scale;
-            let weight_slope = (z_slope - weight * f_slope) / next;
-            let own = slope.scale * z + scale * z_slope;
-            for (((m, l), h), base) in slope.m.iter_mut().zip(&mut slope.l).zip(&l).zip(&m) {
-                *m += *l * scale * z + h * own;
-                // M(t+1) of the process itself is M + h X z.
-                *l -= *m * weight + (base + h * scale * z) * weight_slope;
-            }
-            slope.scale = slope.scale * next / f + scale * (f_slope - next / f * slope.f) / f;
-            slope.f = f_slope;
+        let v = w[t] - first;
+        let (k, next) = (v / f, f + z * z * scale);
+        (found.errors[t], found.variances[t]) = (v, f);
+        let (scaled, weight) = (scale * z, z / next);
+        h.copy_from_slice(&l[1..]);
+        a.iter().for_each(|(lag, a)| h[lag - 1] -= a * z);
+        for i in 0..order {
+            after[i] = before[i] + h[i] * scaled;
+            l[i] = h[i] - after[i] * weight;
+            x[i] = x[i + 1] + before[i] * k;
         }
-        shift(&mut x);
-        subtract(&mut x, &a, first);
-        add(&mut x, &m, k);
+        a.iter().for_each(|(lag, a)| x[lag - 1] -= a * first);
+        let step = Step {
+            a: &a,
+            k,
+            first,
+            z,
+            f,
+            next,
+            scale,
+            scaled,
+            weight,
+            before: &before,
+            after: &after,
+            h: &h,
+        };
+        for (place, slope) in slopes.iter_mut().enumerate() {
+            let (v_slope, f_slope) = slope.step(&step);
+            found.error_slopes[place][t] = v_slope;
+            found.variance_slopes[place][t] = f_slope;
+        }
         for ((x, u), out) in others.iter_mut().zip(columns).zip(&mut found.columns) {
             let (first, own) = (x[0], u[t] - x[0]);
             out[t] = own;
-            shift(x);
-            subtract(x, &a, first);
-            add(x, &m, own / f);
+            for i in 0..order {
+                x[i] = x[i + 1] + before[i] * own / f;
+            }
+            a.iter().for_each(|(lag, a)| x[lag - 1] -= a * first);
         }
-        for (m, l) in m.iter_mut().zip(&mut l) {
-            *m += *l * scale * z;
-            *l -= *m * weight;
-        }
+        std::mem::swap(&mut before, &mut after);
         scale *= next / f;
         f = next;
         if end == rows && t % EVERY == 0 {
             let largest = |l: &[f64]| l.iter().fold(0.0_f64, |largest, l| largest.max(l.abs()));
-            let own = slopes.iter().map(|slope| largest(&slope.l)).fold(largest(&l), f64::max);
+            let own = slopes.iter().map(|slope| largest(&slope.own.l)).fold(largest(&l), f64::max);
             if scale.abs() * own * own < SETTLED {
                 // Then what the state holds is that of the last m samples alone.
-                end = rows.min(t + 1 + arma.order);
+                end = rows.min(t + 1 + order);
             }
         }
+        t += 1;
     }
     if end < rows {
         settled(arma, (w, columns), &slopes, end, &mut found);
@@ -152,7 +183,13 @@ pub(super) fn scan(arma: &Arma, w: &[f64], columns: &[Vec<f64>], with_slopes: bo
 }
 
 /// The rest of the samples, from `first` on: e = A/C w.
-fn settled(arma: &Arma, (w, columns): (&[f64], &[Vec<f64>]), slopes: &[Slope], first: usize, found: &mut Scanned) {
+fn settled(
+    arma: &Arma,
+    (w, columns): (&[f64], &[Vec<f64>]),
+    slopes: &[Slope],
+    first: usize,
+    found: &mut Scanned,
+) {
     let (a, c) = (terms(&arma.a), terms(&arma.c));
     let at = |terms: &Terms, signal: &[f64], t: usize| -> f64 {
         terms.iter().map(|(lag, value)| value * signal[t - lag]).sum()

@@ -41,7 +41,10 @@ fn values(rows: usize) -> Vec<f64> {
     std::iter::repeat_with(next).take(rows).collect()
 }
 
-const CASES: [([usize; 3], Option<[usize; 4]>, &[f64]); 7] = [
+/// (p, d, q), (P, D, Q, s) and the parameters.
+type Case = ([usize; 3], Option<[usize; 4]>, &'static [f64]);
+
+const CASES: [Case; 7] = [
     ([1, 0, 0], None, &[0.7]),
     ([0, 0, 1], None, &[0.9]),
     ([2, 0, 1], None, &[0.6, -0.3, 0.5]),
@@ -106,9 +109,14 @@ fn with_differences_missing_values_are_integrated_over() {
         let found = filtered(&process.scan(&y, &[], expected, false));
         // z after the first n is L^-1 (w - what the first n do), with Delta = L on the others.
         let delta = &process.difference;
-        let lower = DMatrix::from_fn(40, 40, |i, j| {
-            if i >= j { delta.get(i - j).copied().unwrap_or(0.0) } else { 0.0 }
-        });
+        let lower =
+            DMatrix::from_fn(
+                40,
+                40,
+                |i, j| {
+                    if i >= j { delta.get(i - j).copied().unwrap_or(0.0) } else { 0.0 }
+                },
+            );
         let r = covariances(&orders, parameters, 40);
         let inverse = lower.clone().try_inverse().unwrap();
         let covariance = &inverse * DMatrix::from_fn(40, 40, |i, j| r[i.abs_diff(j)]) * inverse.transpose();

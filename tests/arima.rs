@@ -20,8 +20,8 @@ fn factors(report: &Value) -> Vec<(String, f64, f64)> {
     .collect()
 }
 
-/// R's `arima(log(AirPassengers), c(0, 1, 1), list(order = c(0, 1, 1), period = 12))` has ma1 -0.4018 (0.0896), sma1 -0.5569
-/// (0.0731), sigma^2 0.001348 and a log-likelihood of 244.7.
+/// R's `arima(log(AirPassengers), c(0, 1, 1), list(order = c(0, 1, 1), period = 12))` has ma1 -0.4018 (0.0896), sma1
+/// -0.5569 (0.0731), sigma^2 0.001348 and a log-likelihood of 244.7.
 #[test]
 fn the_airline_model_has_the_parameters_of_r() {
     let folder = passengers();

@@ -7,19 +7,19 @@
 //!
 //! The x_j are a constant, a line and inputs. The differences w = Delta z are stationary, and their likelihood begins
 //! with the stationary covariance; through missing outputs it is that of z given the first values that differencing
-//! needs (see [`crate::respond::arima`]). With innovations v of variance f var e over N values, and var e at its best,
-//! S/N with S = sum v^2/f,
+//! needs. With innovations v of variance f var e over N values, and var e at its best, S/N with S = sum v^2/f,
 //!
 //! ```text
 //! -2 ln L = N (ln 2 pi + 1) + N ln(S/N) + sum ln f
 //! ```
 //!
 //! What is minimised is S exp(sum ln f/N), by Fisher scoring with exact derivatives by the parameters of the factors
-//! (`likelihood`), from those of Hannan and Rissanen (`start`), and from small ones where that ends on the unit circle. Each factor stays stable and invertible: its roots are
-//! inside the unit circle.
+//! (`likelihood`), from those of Hannan and Rissanen and from their mirror image (`start`), and from small ones where that ends on the
+//! unit circle.
+//! Each factor stays stable and invertible: its roots are inside the unit circle.
 //!
-//! The covariance of the parameters is the inverse of their information, the observed one. sigma^2 is S/N, the estimate of largest
-//! likelihood.
+//! The covariance of the parameters is the inverse of their information, the observed one. sigma^2 is S/N, the estimate
+//! of largest likelihood.
 //!
 //! Box and Jenkins, Time Series Analysis: Forecasting and Control, 1970, chapters 7 and 9; Harvey, Forecasting,
 //! Structural Time Series Models and the Kalman Filter, 1989, sections 3.3 and 3.4.
@@ -101,12 +101,15 @@ pub(crate) fn arima(
     let mut outcomes = Vec::new();
     let mut winner = 0;
     let given = options.initial_parameters.iter().map(|given| ("initial-parameters", given.clone()));
+    let settled = |found: &Found| {
+        let held = on_circle(orders, &found.parameters, samples);
+        found.stopped == Stopped::Converged && !held.contains(&true)
+    };
     for (number, (name, start)) in given.chain(begin.starts).enumerate() {
+        if name == start::SPARE && best.as_ref().is_some_and(settled) {
+            continue;
+        }
         let found = search(&mut likelihood, &start, options, smallest, deadline, monitor)?.ok();
-        let settled = found.as_ref().is_some_and(|found| {
-            found.stopped == Stopped::Converged
-                && !on_circle(orders, &found.parameters, samples).contains(&true)
-        });
         outcomes.push(StartOutcome {
             name: name.to_owned(),
             cost: found.as_ref().map(|found| found.costs[0] / samples),
@@ -117,10 +120,6 @@ pub(crate) fn arima(
         {
             winner = number;
             best = Some(found);
-        }
-        // Further starts are for a search that went astray.
-        if settled {
-            break;
         }
     }
     outcomes.swap(0, winner);

@@ -115,11 +115,11 @@ options! {
         /// tests and other logs whose mean is not the operating point of the plant. Of arima, which subtracts no mean:
         /// auto is yes without differences, and no with them
         constant: Option<Constant>, "CONSTANT", "auto", MODEL, [P I S V A];
-        /// Estimate a slope and the level of the output with the parameters: for drift; of arima with one difference the
-        /// drift alone
+        /// Estimate a slope and the level of the output with the parameters: for drift; of arima with one difference
+        /// the drift alone
         trend: bool, "", "", MODEL, [P I C A];
-        /// p,d,q of a seasonal ARIMA model (`model` arima): autoregressive parameters, differences and parameters of the
-        /// moving average. The number of states (`model` ss), or a range, from which the least MDL is chosen
+        /// p,d,q of a seasonal ARIMA model (`model` arima): autoregressive parameters, differences and parameters of
+        /// the moving average. The number of states (`model` ss), or a range, from which the least MDL is chosen
         order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20", SEASONS, [S A];
         /// The same over seasons, and the rows that a season has: P,D,Q,s. Inputs, if `input` names any, act on the
         /// output in the same row unless `nk` says otherwise, and all else is the noise

@@ -128,8 +128,8 @@ impl<'a> Likelihood<'a> {
 
     /// The information that was observed, half the second derivatives of the cost, in the place of that expected: of
     /// differences of the gradient, some thousandths of these standard errors to each side. Stays as it is where it is
-    /// not positive definite, or a step leaves the region of stability. Efron and Hinkley (Biometrika 65 (1978)) have why
-    /// it is the better one.
+    /// not positive definite, or a step leaves the region of stability. Efron and Hinkley (Biometrika 65 (1978)) have
+    /// why it is the better one.
     pub(super) fn observe(&mut self, at: &[f64], standard_errors: &[f64]) {
         let size = at.len();
         let expected = std::mem::take(&mut self.matrix);
@@ -183,8 +183,9 @@ impl<'a> Likelihood<'a> {
         factors.iter().all(|monic| is_stable(monic, &mut scratch))
     }
 
-    /// Moves the roots of each factor of `trial` that is not stable back into the unit circle, nearer to it than those at
-    /// `from`. A moving average is not reflected there: where the likelihood is largest on the circle, that ends halfway.
+    /// Moves the roots of each factor of `trial` that is not stable back into the unit circle, nearer to it than those
+    /// at `from`. A moving average is not reflected there: where the likelihood is largest on the circle, that ends
+    /// halfway.
     fn moved_in(&self, from: &[f64], trial: &mut [f64]) -> bool {
         let orders = &self.orders;
         let (before, after) = (orders.factors(from), orders.factors(trial));

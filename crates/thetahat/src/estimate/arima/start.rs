@@ -1,8 +1,8 @@
 //! Parameters to start from, in two regressions.
 //!
-//! Columns are fitted to the differences by least squares. Of what is left, w, a long autoregression gives errors e, and
-//! a regression of w(t) on w and e at the lags of the factors gives their parameters, products of these left out (Hannan
-//! and Rissanen, Biometrika 69 (1982)). A missing difference counts as zero there.
+//! Columns are fitted to the differences by least squares. Of what is left, w, a long autoregression gives errors e,
+//! and a regression of w(t) on w and e at the lags of the factors gives their parameters, products of these left out
+//! (Hannan and Rissanen, Biometrika 69 (1982)). A missing difference counts as zero there.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::optimize::Objective;
@@ -19,6 +19,9 @@ const INSIDE: f64 = 0.95;
 const DEPENDENT: f64 = 1e-8;
 /// The parameters of an autoregression and of a moving average that are not told apart at 0.
 const SMALL: f64 = 0.1;
+
+/// The start for searches from the others that went astray.
+pub(super) const SPARE: &str = "small";
 
 /// Where a search begins.
 pub(super) struct Begin {
@@ -61,10 +64,12 @@ pub(super) fn begin(likelihood: &Likelihood<'_>, data: &ArimaData<'_>) -> Result
     if orders.parameters() > 0
         && let Some(own) = hannan_rissanen(&filled, orders, likelihood.samples())
     {
+        let mirrored = mirrored(orders, &own);
         add("hannan-rissanen", own);
+        mirrored.into_iter().for_each(|own| add("mirrored", own));
     }
     add(
-        "small",
+        SPARE,
         Factor::ALL
             .iter()
             .flat_map(|factor| {
@@ -74,6 +79,19 @@ pub(super) fn begin(likelihood: &Likelihood<'_>, data: &ArimaData<'_>) -> Result
             .collect(),
     );
     Ok(Begin { energy, starts })
+}
+
+/// Where a factor has an autoregression beside a moving average, these may nearly cancel in one of two places: the start
+/// with the signs of both changed. None of other models.
+fn mirrored(orders: &ArimaOrders, parameters: &[f64]) -> Option<Vec<f64>> {
+    let [ar, ma, seasonal_ar, seasonal_ma] = Factor::ALL.map(|factor| orders.factor(factor).0);
+    let both = [ar.min(ma), ar.min(ma), seasonal_ar.min(seasonal_ma), seasonal_ar.min(seasonal_ma)];
+    let signs = [ar, ma, seasonal_ar, seasonal_ma]
+        .into_iter()
+        .zip(both)
+        .flat_map(|(count, both)| std::iter::repeat_n(if both > 0 { -1.0 } else { 1.0 }, count));
+    let any = both.iter().any(|both| *both > 0);
+    any.then(|| parameters.iter().zip(signs).map(|(value, sign)| sign * value).collect())
 }
 
 /// The columns' weights of least squares, by the modified Gram-Schmidt process.

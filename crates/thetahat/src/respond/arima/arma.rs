@@ -13,8 +13,8 @@
 //! ```
 //!
 //! where rho are the autocovariances of 1/A e: of the step-down recursion rho(0) = prod 1/(1 - k_n^2), and with the
-//! predictors a^(n) of each lower order rho(n) = -sum_j a_j^(n) rho(n-j) (Kay, Modern Spectral Estimation, 1988, section
-//! 6.3). Their derivatives follow from the autocovariances of 1/A^2 e, since d(1/A) = -dA/A^2.
+//! predictors a^(n) of each lower order rho(n) = -sum_j a_j^(n) rho(n-j) (Kay, Modern Spectral Estimation, 1988,
+//! section 6.3). Their derivatives follow from the autocovariances of 1/A^2 e, since d(1/A) = -dA/A^2.
 
 use crate::model::Expanded;
 use crate::model::polynomial::product as multiplied;

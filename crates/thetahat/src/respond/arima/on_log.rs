@@ -23,7 +23,8 @@ pub(crate) struct ArimaOnLog<'l> {
     /// y less what the inputs do.
     noise: Vec<f64>,
     expected: Vec<Expected>,
-    /// Innovations and their variances over that of e in the rows that count, one list for each of these, when they are first needed.
+    /// Innovations and their variances over that of e in the rows that count, one list for each of these, when they
+    /// are first needed.
     innovations: OnceLock<Vec<(Vec<f64>, Vec<f64>)>>,
     free_runs: PolynomialOnLog<'l>,
 }

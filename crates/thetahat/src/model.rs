@@ -41,7 +41,7 @@ mod process;
 mod quantity;
 mod state_space;
 
-pub use arima::{ArimaFactors, ArimaOrders};
+pub use arima::ArimaOrders;
 pub(crate) use arima::{Expanded, Factor};
 pub use convert::TimeBase;
 pub(crate) use dynamics::{
@@ -50,7 +50,7 @@ pub(crate) use dynamics::{
 pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
 pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
-pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
+pub use fitted::{ArimaFactors, OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub(crate) use kind::FilterForm;
 pub use kind::Model;
 pub use known::{ChannelNames, Coefficients, KnownOptions, Matrix, Polynomials, TransferFunction};

@@ -14,9 +14,8 @@
 //! ```
 //!
 //! What is minimised is S exp(sum ln f/N), by Fisher scoring with exact derivatives by the parameters of the factors
-//! (`likelihood`), from those of Hannan and Rissanen and from their mirror image (`start`), and from small ones where that ends on the
-//! unit circle.
-//! Each factor stays stable and invertible: its roots are inside the unit circle.
+//! (`likelihood`), from those of Hannan and Rissanen and from their mirror image (`start`), and from small ones where
+//! that ends on the unit circle. Each factor stays stable and invertible: its roots are inside the unit circle.
 //!
 //! The covariance of the parameters is the inverse of their information, the observed one. sigma^2 is S/N, the estimate
 //! of largest likelihood.
@@ -45,6 +44,9 @@ use likelihood::Likelihood;
 
 /// A root at a distance from the unit circle of less than this over the number of its lags in the data is on it.
 const ON_CIRCLE: f64 = 0.1;
+
+/// How often a search that ended there goes on.
+const AGAIN: usize = 3;
 
 /// What is fitted: values with columns beside them, one value a row.
 #[derive(Debug, Clone)]
@@ -109,7 +111,23 @@ pub(crate) fn arima(
         if name == start::SPARE && best.as_ref().is_some_and(settled) {
             continue;
         }
-        let found = search(&mut likelihood, &start, options, smallest, deadline, monitor)?.ok();
+        let mut run = |start: &[f64]| search(&mut likelihood, start, options, smallest, deadline, monitor);
+        let mut found = run(&start)?.ok();
+        // What ends on the unit circle goes on from inside of it as long as that leads further.
+        for _ in 0..AGAIN {
+            let Some(ended) = found.as_ref().filter(|found| found.stopped == Stopped::NoDescent) else {
+                break;
+            };
+            let mut inside = ended.parameters.clone();
+            start::inside(orders, &mut inside[data.columns.len()..]);
+            match run(&inside)? {
+                Ok(again) if again.cost() < (1.0 - options.tolerance) * ended.cost() => {
+                    let costs = [&ended.costs[..], &[again.cost()]].concat();
+                    found = Some(Found { costs, ..again });
+                }
+                _ => break,
+            }
+        }
         outcomes.push(StartOutcome {
             name: name.to_owned(),
             cost: found.as_ref().map(|found| found.costs[0] / samples),

@@ -5,9 +5,8 @@ use std::borrow::Cow;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::arima::ArimaFactors;
 use super::equations::{EquationsModel, GreyBox};
-use super::fitted::{Parameter, PolynomialModel, Signal};
+use super::fitted::{ArimaFactors, Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
 use super::orders::Structure;
@@ -149,8 +148,8 @@ impl Model {
         }
     }
 
-    /// The parameters, in the order of the covariance; of a seasonal ARIMA model those of its factors. A state-space model has none: the entries of its matrices depend
-    /// on the coordinates of the state.
+    /// The parameters, in the order of the covariance; of a seasonal ARIMA model those of its factors. A state-space
+    /// model has none: the entries of its matrices depend on the coordinates of the state.
     pub fn parameters(&self) -> &[Parameter] {
         match self {
             Self::Polynomial(model) => match &model.factors {

@@ -81,7 +81,7 @@ pub(super) fn begin(likelihood: &Likelihood<'_>, data: &ArimaData<'_>) -> Result
     Ok(Begin { energy, starts })
 }
 
-/// Where a factor has an autoregression beside a moving average, these may nearly cancel in one of two places: the start
+/// Where there is an autoregression beside a moving average, these may nearly cancel in one of two places: the start
 /// with the signs of both changed. None of other models.
 fn mirrored(orders: &ArimaOrders, parameters: &[f64]) -> Option<Vec<f64>> {
     let [ar, ma, seasonal_ar, seasonal_ma] = Factor::ALL.map(|factor| orders.factor(factor).0);
@@ -220,7 +220,7 @@ fn autoregressive_errors(sections: &[Vec<f64>], order: usize) -> Vec<Vec<f64>> {
 }
 
 /// Moves the roots of all factors inside a circle.
-fn inside(orders: &ArimaOrders, parameters: &mut [f64]) {
+pub(super) fn inside(orders: &ArimaOrders, parameters: &mut [f64]) {
     let factors = orders.factors(parameters);
     let mut place = 0;
     let mut product = Vec::new();

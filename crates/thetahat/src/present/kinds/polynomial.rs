@@ -25,8 +25,11 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &PolynomialMode
     on.table(parameters(report.model.parameters()).without(if given { &[2] } else { &[] }));
     samples(on, &report.estimation, model.noise_variance, &model.output);
     procedure(on, report);
-    on.gap();
-    dynamics(on, model);
+    let seasonal = model.factors.is_some();
+    if on.is_page() || !(seasonal && model.inputs.is_empty()) {
+        on.gap();
+        dynamics(on, model);
+    }
     responses(on, report, true);
     closing(on, report);
 }
@@ -70,9 +73,7 @@ fn dynamics(on: &mut Sections, model: &PolynomialModel) {
         on.table(roots);
     }
     static_gains(on, model);
-    if model.factors.is_none() || !model.inputs.is_empty() {
-        on.line(stable(model.stable));
-    }
+    on.line(stable(model.stable));
 }
 
 /// The static gain from each input.

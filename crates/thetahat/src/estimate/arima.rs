@@ -45,6 +45,8 @@ use likelihood::Likelihood;
 /// A root at a distance from the unit circle of less than this over the number of its lags in the data is on it.
 const ON_CIRCLE: f64 = 0.1;
 
+/// The tolerance of searches after the first, until they find less.
+const ROUGH: f64 = 1e-4;
 /// How often a search that ended there goes on.
 const AGAIN: usize = 3;
 
@@ -107,12 +109,23 @@ pub(crate) fn arima(
         let held = on_circle(orders, &found.parameters, samples);
         found.stopped == Stopped::Converged && !held.contains(&true)
     };
+    let rough = Search { tolerance: options.tolerance.max(ROUGH), ..options.clone() };
     for (number, (name, start)) in given.chain(begin.starts).enumerate() {
         if name == start::SPARE && best.as_ref().is_some_and(settled) {
             continue;
         }
-        let mut run = |start: &[f64]| search(&mut likelihood, start, options, smallest, deadline, monitor);
-        let mut found = run(&start)?.ok();
+        let mut run =
+            |start: &[f64], how: &Search| search(&mut likelihood, start, how, smallest, deadline, monitor);
+        let mut found = match &best {
+            None => run(&start, options)?.ok(),
+            // A second search need not end where the first did once more.
+            Some(best) => match run(&start, &rough)?.ok() {
+                Some(near) if near.cost() < best.cost() => {
+                    run(&near.parameters, options)?.ok().or(Some(near))
+                }
+                other => other,
+            },
+        };
         // What ends on the unit circle goes on from inside of it as long as that leads further.
         for _ in 0..AGAIN {
             let Some(ended) = found.as_ref().filter(|found| found.stopped == Stopped::NoDescent) else {
@@ -120,7 +133,7 @@ pub(crate) fn arima(
             };
             let mut inside = ended.parameters.clone();
             start::inside(orders, &mut inside[data.columns.len()..]);
-            match run(&inside)? {
+            match run(&inside, options)? {
                 Ok(again) if again.cost() < (1.0 - options.tolerance) * ended.cost() => {
                     let costs = [&ended.costs[..], &[again.cost()]].concat();
                     found = Some(Found { costs, ..again });

@@ -14,7 +14,7 @@ use crate::respond::arima::ArimaProcess;
 /// Roots of factors are inside this circle.
 const INSIDE: f64 = 1.0 - 1e-6;
 /// The step of differences of the gradient, in standard errors.
-const STEP: f64 = 1e-3;
+const STEP: f64 = 1e-4;
 /// A root that a step takes out of the unit circle is moved back to this fraction of its distance before.
 const NEARER: f64 = 0.2;
 
@@ -127,12 +127,12 @@ impl<'a> Likelihood<'a> {
     }
 
     /// The information that was observed, half the second derivatives of the cost, in the place of that expected: of
-    /// differences of the gradient, some thousandths of these standard errors to each side. Stays as it is where it is
-    /// not positive definite, or a step leaves the region of stability. Efron and Hinkley (Biometrika 65 (1978)) have
-    /// why it is the better one.
+    /// differences of the gradient that was linearised last, a small part of these standard errors away. Stays as it is
+    /// where it is not positive definite, or a step leaves the region of stability. Efron and Hinkley (Biometrika 65
+    /// (1978)) have why it is the better one.
     pub(super) fn observe(&mut self, at: &[f64], standard_errors: &[f64]) {
         let size = at.len();
-        let expected = std::mem::take(&mut self.matrix);
+        let (expected, here) = (std::mem::take(&mut self.matrix), self.right.clone());
         self.matrix = vec![0.0; size * size];
         let mut observed = vec![0.0; size * size];
         let mut gradient = |place: usize, step: f64| -> Option<Vec<f64>> {
@@ -148,13 +148,13 @@ impl<'a> Likelihood<'a> {
         // Parameters without one are held.
         for (place, error) in standard_errors.iter().enumerate().filter(|(_, error)| **error > 0.0) {
             let step = STEP * error;
-            let Some((up, down)) = gradient(place, step).zip(gradient(place, -step)) else {
+            let Some(there) = gradient(place, step) else {
                 all = false;
                 break;
             };
-            for (other, (up, down)) in up.iter().zip(&down).enumerate() {
+            for (other, (here, there)) in here.iter().zip(&there).enumerate() {
                 // Half of each from both sides of the diagonal.
-                let slope = (down - up) / (4.0 * step);
+                let slope = (here - there) / (2.0 * step);
                 observed[place * size + other] += slope;
                 observed[other * size + place] += slope;
             }

@@ -1,5 +1,6 @@
 //! End-to-end tests of the binary: one file a subject.
 
+mod arima;
 mod bad_input;
 mod bad_options;
 mod bad_report;

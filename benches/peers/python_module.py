@@ -21,11 +21,12 @@ from filterpy.kalman import KalmanFilter
 from nfoursid.nfoursid import NFourSID
 from scipy.signal import coherence, csd, lfilter, welch
 from sippy_unipi import system_identification
+from statsmodels.tsa.statespace.sarimax import SARIMAX
 from sysidentpy.basis_function import Polynomial
 from sysidentpy.model_structure_selection import FROLS
 from sysidentpy.parameter_estimation import LeastSquares
 
-PACKAGES = ["thetahat", "NumPy", "SciPy", "padasip", "filterpy", "sippy-unipi", "nfoursid", "ctrlsys", "sysidentpy"]
+PACKAGES = ["thetahat", "NumPy", "SciPy", "padasip", "filterpy", "sippy-unipi", "nfoursid", "ctrlsys", "sysidentpy", "statsmodels"]
 
 
 def main():
@@ -35,7 +36,7 @@ def main():
     print(*(f"{name} {version(name)}" for name in PACKAGES), f"Python {platform.python_version()}", sep=", ")
     print(f"{processor()}, {os.cpu_count()} processors", end="\n\n", flush=True)
     rows = [["work", "peer", "thetahat", "peer's", "ratio", "required", "verdict"]]
-    rows += [recursive(), kalman(), *fits(), *states(), *nonlinear(), *spectra(), *calls()]
+    rows += [recursive(), kalman(), *fits(), *states(), *nonlinear(), *seasonal(), *spectra(), *calls()]
     print_table(rows)
 
 
@@ -266,6 +267,27 @@ def nonlinear():
         check("SysIdentPy", [coefficients.get(name, 0.0) for name in found.parameter_names], found.parameters)
         work = f"{candidates} products, N = {samples:,}"
         yield row(f"NARX, 20 of {work}", "SysIdentPy, FROLS", mine, yours, required)
+
+
+def seasonal():
+    """Seasonal ARIMA models by exact likelihood, the whole call: ours with all figures of the fit, and no smaller likelihood."""
+    random = numpy.random.default_rng(2)
+    for samples, required in [(200, None), (1_000, 100)]:
+        e = random.standard_normal(samples + 200)
+        w = lfilter(numpy.convolve([1, 0.3], [1, *[0] * 11, -0.5]), [1, -0.5], e)
+        y = lfilter([1], numpy.convolve([1, -1], [1, *[0] * 11, -1]), w)[200:]
+        log = thetahat.Log(y, sample_time=1)
+
+        def ours(log=log):
+            return thetahat.arima(log, order=(1, 1, 1), seasonal=(0, 1, 1, 12))
+
+        def theirs(y=y):
+            return SARIMAX(y, order=(1, 1, 1), seasonal_order=(0, 1, 1, 12)).fit(disp=0)
+
+        mine, yours, found, expected = by_turns(ours, theirs, 12, 6)
+        if found.log_likelihood < expected.llf - 1e-3:
+            raise SystemExit(f"SARIMAX: ln L {expected.llf} is above ours, {found.log_likelihood}")
+        yield row(f"ARIMA(1, 1, 1)(0, 1, 1, 12), N = {samples:,}", "statsmodels, SARIMAX", mine, yours, required)
 
 
 def spectra():

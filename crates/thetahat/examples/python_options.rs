@@ -18,7 +18,7 @@ use thetahat::spectrum::SpectrumOptions;
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../py/python/thetahat/engine/option_types.py");
 
 /// The parameters that functions have before their options: what the model is about, its structure and its orders.
-const OWN_PARAMETERS: [&str; 23] = [
+const OWN_PARAMETERS: [&str; 24] = [
     "couple",
     "delay",
     "input",
@@ -39,18 +39,20 @@ const OWN_PARAMETERS: [&str; 23] = [
     "order",
     "output",
     "path",
+    "seasonal",
     "structure",
     "taps",
     "term",
 ];
 
 /// A class of the options of a fit, what it says, and the kind of model whose options it has.
-const FITS: [(&str, &str, Kind); 6] = [
+const FITS: [(&str, &str, Kind); 7] = [
     (
         "FitOptions",
         "What every fit of a model of polynomials can be told, beside the orders.",
         Kind::POLYNOMIAL,
     ),
+    ("ArimaOptions", "What a fit of a seasonal ARIMA model can be told.", Kind::ARIMA),
     ("ImpulseResponseOptions", "What a fit of an impulse response can be told.", Kind::IMPULSE_RESPONSE),
     ("StateSpaceOptions", "What a fit of a model in state space can be told.", Kind::STATE_SPACE),
     ("ProcessOptions", "What a fit of a process in continuous time can be told.", Kind::PROCESS),

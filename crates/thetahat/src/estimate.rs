@@ -34,6 +34,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+mod arima;
 mod arx;
 mod common;
 mod criteria;
@@ -79,6 +80,7 @@ use crate::Error;
 use crate::data::Record;
 use crate::model::{Orders, Structure};
 use crate::model::{PolynomialModel, Signal};
+pub(crate) use arima::{ArimaData, ArimaEstimate, arima};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f, lagged_products, out_of_range, taps};
 pub(crate) use common::{Common, Point, Window};

@@ -3,6 +3,7 @@
 //! [`FitDraft::new`] checks [`FitOptions`] and says what of a log is wanted; [`FitDraft::plan`] makes a [`FitPlan`] for
 //! its channels, which [`FitPlan::fit`] carries out. [`FitPlan::pieces`] are for logs that are read part by part.
 
+mod arima;
 mod method;
 mod nonlinear_arx;
 mod orders;
@@ -27,6 +28,7 @@ use crate::report::{
     fit_process_to_response,
 };
 use crate::spectrum::MeasuredResponse;
+use arima::ArimaDraft;
 use nonlinear_arx::NonlinearArxDraft;
 use polynomial::PolynomialDraft;
 use process::ProcessDraft;
@@ -156,6 +158,7 @@ impl FitDraft {
     pub fn new(options: &FitOptions, fitted: Fitted) -> Result<Self, Error> {
         let draft: Box<dyn Draft> = match options.kind(fitted)?.kind {
             Kind::POLYNOMIAL | Kind::IMPULSE_RESPONSE => Box::new(PolynomialDraft::new(options)?),
+            Kind::ARIMA => Box::new(ArimaDraft::new(options)?),
             Kind::STATE_SPACE => Box::new(StateSpaceDraft::new(options, false)?),
             Kind::VECTOR_ARX => Box::new(StateSpaceDraft::new(options, true)?),
             Kind::PROCESS | Kind::RESPONSE => Box::new(ProcessDraft::new(options, fitted)?),

@@ -5,6 +5,7 @@
 //! - [`PolynomialModel`] has the polynomials, each [`Parameter`] with its standard error, every [`Root`] and
 //!   [`Quantity`] that follows from them with an [`Interval`], and the [`Signal`]s it was fitted to.
 //!   [`OffsetCovariance`] is the uncertainty of the output's offset.
+//! - [`ArimaFactors`] of [`ArimaOrders`] are what C and D of a seasonal ARIMA model are products of.
 //! - [`StateSpace`] is the same model as a recursion of first order, for filters and controllers: of fewer states
 //!   ([`Reduced`]), in continuous time ([`ContinuousStateSpace`]) as a [`Hold`] says, or as [`ZerosPolesGain`] of one
 //!   input and output. [`StateSpaceModel`] is one that was estimated as such, with any number of outputs,
@@ -24,6 +25,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+mod arima;
 mod assembly;
 mod convert;
 mod dynamics;
@@ -39,6 +41,8 @@ mod process;
 mod quantity;
 mod state_space;
 
+pub use arima::ArimaOrders;
+pub(crate) use arima::{Expanded, Factor};
 pub use convert::TimeBase;
 pub(crate) use dynamics::{
     Block, Blocks, Gradient, cancel, covariance, is_simple, near_cancellation, standard_error,
@@ -46,7 +50,7 @@ pub(crate) use dynamics::{
 pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
 pub use equations::{EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
-pub use fitted::{OffsetCovariance, Parameter, PolynomialModel, Signal};
+pub use fitted::{ArimaFactors, OffsetCovariance, Parameter, PolynomialModel, Signal};
 pub(crate) use kind::FilterForm;
 pub use kind::Model;
 pub use known::{ChannelNames, Coefficients, KnownOptions, Matrix, Polynomials, TransferFunction};

@@ -13,5 +13,5 @@ pub use asked::Fitted;
 pub use fit::FitOptions;
 pub use words::{
     CoupleWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord, ModelWord,
-    NormOption, StepOption,
+    NormOption, OrderOption, SeasonalOption, StepOption,
 };

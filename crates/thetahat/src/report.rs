@@ -6,7 +6,7 @@
 //!   [`fit_process_to_response`] for one of a measured frequency response, [`fit_state_space`]
 //!   ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`],
 //!   [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`],
-//!   [`Centres`]).
+//!   [`Centres`]), [`fit_arima`] for a seasonal ARIMA model with an [`ArimaPlan`].
 //! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than
 //!   memory.
 //! - [`Experiments`] are what others hold, in other processes or on other machines, as a search for one model of all
@@ -42,6 +42,7 @@
 //! ```
 
 mod apply;
+mod arima;
 mod convert;
 mod equations;
 mod evaluate;
@@ -73,6 +74,7 @@ mod validation;
 mod warnings;
 
 pub use apply::{Applied, AppliedOutput, apply};
+pub use arima::{ArimaPlan, fit_arima};
 pub use equations::{EquationsPlan, answer_equations, fit_equations, fit_equations_distributed};
 pub use experiments::Experiments;
 pub use held_out_runs::held_out_runs;

@@ -34,6 +34,7 @@
 //! # Ok::<(), thetahat::Error>(())
 //! ```
 
+pub(crate) mod arima;
 mod continuous;
 mod draws;
 pub(crate) mod equations;

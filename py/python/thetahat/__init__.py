@@ -8,7 +8,8 @@ Model(ARMAX(2, 2, 1, 1), 1-step fit 98.37 % on rows 1..700)
 
 Logs            `Log`, `read_log`, `read_csv`, `topics` of the log of a flight, `inspect` before a fit.
 Fits            `fit` takes the model that the data ask for, `search` chooses among orders, `fit_many` does it with many logs.
-  polynomials   `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
+  polynomials   `arx`, `armax`, `oe`, `bj`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
+  time series   `arima` with differences and seasons, `ar`, `arma`.
   others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations.
 Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
                 `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
@@ -67,6 +68,7 @@ from thetahat.controllers.control import Control, LoopRun, closed_loop, lqr, min
 from thetahat.controllers.tune import Tuning, tune
 from thetahat.engine import signatures as _signatures
 from thetahat.engine.option_types import (
+    ArimaOptions,
     DesignOptions,
     EquationsOptions,
     FitOptions,
@@ -81,6 +83,7 @@ from thetahat.engine.options import ReadOptions
 from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
+from thetahat.fits.arima import arima
 from thetahat.fits.comparison import Comparison, compare
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
 from thetahat.fits.grey_box import GreyBox, grey
@@ -108,6 +111,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Alarm",
+    "ArimaOptions",
     "ChangeDetector",
     "ChangeTrajectory",
     "Comparison",
@@ -177,6 +181,7 @@ __all__ = [
     "WindowedLeastSquares",
     "__version__",
     "ar",
+    "arima",
     "arma",
     "armax",
     "arx",

@@ -11,7 +11,7 @@ use super::{Common, Draft, KindPlan, common};
 use crate::Error;
 use crate::data::{Log, Source};
 use crate::estimate::{Coupling, Initial, SubspaceOptions, VectorArxInputs, VectorArxOptions};
-use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions};
+use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions, OrderOption};
 use crate::report::{NormalEquations, PendingEvaluation, Report, StateSpacePlan, fit_state_space_monitored};
 use crate::select::{Focus, OrderRange};
 
@@ -37,7 +37,16 @@ impl StateSpaceDraft {
         let without_inputs = options.is_without_inputs();
         check(options, is_arx)?;
         let Common { estimate, validate, split, detrend, offsets } = common(options)?;
-        let order = options.order.map(|order| order.first()..=order.last());
+        let order = match options.order {
+            Some(OrderOption::Arima(_)) => {
+                return Err(Error::argument(
+                    "order",
+                    "p,d,q is of `model` arima; write it as N or A..B, such as 4 or 1..10",
+                ));
+            }
+            Some(OrderOption::States(order)) => Some(order.first()..=order.last()),
+            None => None,
+        };
         if order.as_ref().is_some_and(|order| *order.start() == 0) {
             return Err(Error::argument("order", "write it as N or A..B, from 1 on, such as 4 or 1..10"));
         }

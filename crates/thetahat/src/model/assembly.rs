@@ -63,6 +63,7 @@ impl PolynomialModel {
             parameters,
             covariance: covariance.map(<[_]>::to_vec),
             offset_covariance: None,
+            factors: None,
             poles: Vec::new(),
             zeros: Vec::new(),
             noise_poles: Vec::new(),

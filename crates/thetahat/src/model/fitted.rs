@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DMatrix;
 use thetahat_numerics::distribution::{student_factor, student_two_sided};
 
+use super::arima::{ArimaOrders, Expanded};
+use super::polynomial::product;
 use super::quantity::{Quantity, Root};
 use crate::Error;
 use crate::data::Offset;
@@ -55,6 +57,19 @@ impl OffsetCovariance {
     }
 }
 
+/// The factors of a seasonal ARIMA model: its own parameters, of which the coefficients of C and D are functions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArimaFactors {
+    /// (p, d, q)(P, D, Q, s).
+    #[serde(flatten)]
+    pub orders: ArimaOrders,
+    /// The parameters with their standard errors: the constant, the drift and the coefficients of inputs, as far as
+    /// there are any, then those of the factors, such as `ar1`, `ma1`, `sar12` and `sma12`.
+    pub parameters: Vec<Parameter>,
+    /// The covariance matrix of these, row by row; none where it cannot be computed.
+    pub covariance: Option<Vec<Vec<f64>>>,
+}
+
 /// An estimated model: A(q) y(t) = sum_j B_j(q)/F_j(q) u_j(t) + C(q)/D(q) e(t), var e = `noise_variance`.
 ///
 /// Polynomials are written in rising powers of q^-1: `b[j][i]` multiplies u_j(t - i), so B begins with nk zeros.
@@ -100,6 +115,10 @@ pub struct PolynomialModel {
     /// known, and in reports that do not say. Predictions, forecasts and drawn runs count it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub offset_covariance: Option<OffsetCovariance>,
+    /// The factors of C and D of a seasonal ARIMA model: its own parameters, of which those above are functions. None
+    /// of other models.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub factors: Option<ArimaFactors>,
     /// The roots of A, then of each F, in the z plane, the largest of each polynomial first.
     pub poles: Vec<Root>,
     /// The finite roots of B in the z plane, for each input.
@@ -116,6 +135,9 @@ pub struct PolynomialModel {
     pub time_constants: Vec<Option<Quantity>>,
 }
 
+/// Coefficients that differ by less, relative to 1 and themselves, are the same.
+const SAME: f64 = 1e-9;
+
 /// Where |D(1)| is below this fraction of what it is a sum of, D has the root 1.
 const INTEGRATOR: f64 = 1e-9;
 
@@ -124,6 +146,72 @@ impl PolynomialModel {
     pub fn noise_integrates(&self) -> bool {
         let size: f64 = self.d.iter().map(|d| d.abs()).sum();
         self.d.iter().sum::<f64>().abs() <= INTEGRATOR * size
+    }
+}
+
+impl ArimaFactors {
+    /// The equation, such as (1 - q^-1) (1 - q^-12) y(t) = theta(q) Theta(q^12) e(t). z is the output without what a
+    /// constant, a drift and inputs do.
+    pub fn equation(&self) -> String {
+        let orders = &self.orders;
+        let season = orders.season();
+        let ([p, d, q], [sp, sd, sq, _]) = (orders.order, orders.seasonal.unwrap_or_default());
+        let power = |times: usize| if times > 1 { format!("^{times}") } else { String::new() };
+        let inputs = self.parameters.iter().filter(|parameter| parameter.name.starts_with('b')).count();
+        let has = |name: &str| self.parameters.iter().any(|parameter| parameter.name == name);
+        let terms = [
+            (has("constant"), "constant"),
+            (has("drift"), "drift t"),
+            (inputs == 1, "B(q) u(t)"),
+            (inputs > 1, "sum_j B_j(q) u_j(t)"),
+            (true, "z(t)"),
+        ];
+        let terms: Vec<&str> = terms.into_iter().filter(|(there, _)| *there).map(|(_, term)| term).collect();
+        let of = if terms.len() > 1 { "z(t)" } else { "y(t)" };
+        let left = [
+            (p > 0, "phi(q) ".to_owned()),
+            (sp > 0, format!("Phi(q^{season}) ")),
+            (d > 0, format!("(1 - q^-1){} ", power(d))),
+            (sd > 0, format!("(1 - q^-{season}){} ", power(sd))),
+        ];
+        let right = [(q > 0, "theta(q) ".to_owned()), (sq > 0, format!("Theta(q^{season}) "))];
+        let side = |factors: &[(bool, String)]| -> String {
+            factors.iter().filter(|(there, _)| *there).map(|(_, factor)| factor.as_str()).collect()
+        };
+        let equation = format!("{}{of} = {}e(t)", side(&left), side(&right));
+        if terms.len() > 1 { format!("y(t) = {}, {equation}", terms.join(" + ")) } else { equation }
+    }
+
+    /// Checks factors that were read: that the polynomials of the model are their products.
+    pub(super) fn check(&self, model: &PolynomialModel) -> Result<(), Error> {
+        let wrong = |what: &str| {
+            Err(Error::report(format!("model.factors: {what}; the report was edited or damaged")))
+        };
+        let ArimaOrders { order, seasonal } = self.orders;
+        if ArimaOrders::new(order, seasonal).as_ref() != Ok(&self.orders) {
+            return wrong("the orders make no sense");
+        }
+        let Some(own) = self.parameters.len().checked_sub(self.orders.parameters()) else {
+            return wrong("there are fewer parameters than the orders have");
+        };
+        if !self.parameters[own..].iter().map(|parameter| &parameter.name).eq(&self.orders.names()) {
+            return wrong("the parameters are not those of the orders");
+        }
+        let count = self.parameters.len();
+        let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
+        if !self.covariance.as_ref().is_none_or(square) {
+            return wrong("the covariance does not have a row and a column for each parameter");
+        }
+        let values: Vec<f64> = self.parameters[own..].iter().map(|parameter| parameter.value).collect();
+        let Expanded { a, c, .. } = self.orders.expanded(&values, false);
+        let near = |one: &[f64], other: &[f64]| {
+            let close = |(one, other): (&f64, &f64)| (one - other).abs() <= SAME * (1.0 + other.abs());
+            one.len() == other.len() && one.iter().zip(other).all(close)
+        };
+        if !near(&model.c, &c) || !near(&model.d, &product(&a, &self.orders.differencing())) {
+            return wrong("c and d are not their products");
+        }
+        Ok(())
     }
 }
 
@@ -250,6 +338,9 @@ impl PolynomialModel {
         let square = |rows: &Vec<Vec<f64>>| rows.len() == count && rows.iter().all(|row| row.len() == count);
         if !self.covariance.as_ref().is_none_or(square) {
             return wrong("covariance does not have a row and a column for each parameter");
+        }
+        if let Some(factors) = &self.factors {
+            factors.check(self)?;
         }
         if let Some(open) = &self.offset_covariance {
             let count = count + open.count();

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::equations::{EquationsModel, GreyBox};
-use super::fitted::{Parameter, PolynomialModel, Signal};
+use super::fitted::{ArimaFactors, Parameter, PolynomialModel, Signal};
 use super::linear::LinearModel;
 use super::nonlinear_arx::NonlinearArxModel;
 use super::orders::Structure;
@@ -148,11 +148,14 @@ impl Model {
         }
     }
 
-    /// The parameters, in the order of the covariance. A state-space model has none: the entries of its matrices depend
-    /// on the coordinates of the state.
+    /// The parameters, in the order of the covariance; of a seasonal ARIMA model those of its factors. A state-space
+    /// model has none: the entries of its matrices depend on the coordinates of the state.
     pub fn parameters(&self) -> &[Parameter] {
         match self {
-            Self::Polynomial(model) => &model.parameters,
+            Self::Polynomial(model) => match &model.factors {
+                Some(factors) => &factors.parameters,
+                None => &model.parameters,
+            },
             Self::Equations(model) => &model.parameters,
             Self::NonlinearArx(model) => &model.parameters,
             Self::Process(model) => &model.parameters,
@@ -174,7 +177,10 @@ impl Model {
     /// The covariance matrix of the parameters, row by row; none where it is not known.
     pub fn covariance(&self) -> Option<&[Vec<f64>]> {
         match self {
-            Self::Polynomial(model) => model.covariance.as_deref(),
+            Self::Polynomial(model) => match &model.factors {
+                Some(factors) => factors.covariance.as_deref(),
+                None => model.covariance.as_deref(),
+            },
             Self::Equations(model) => model.covariance.as_deref(),
             Self::NonlinearArx(model) => model.covariance.as_deref(),
             Self::Process(model) => model.covariance.as_deref(),
@@ -426,7 +432,10 @@ impl Model {
     /// What it is called, with the equation where that is short.
     pub fn headline(&self) -> String {
         match self {
-            Self::Polynomial(model) => format!("{}: {}", model.orders, model.orders.equation()),
+            Self::Polynomial(model) => {
+                let own = model.factors.as_ref().map(ArimaFactors::equation);
+                format!("{}: {}", self.name(), own.unwrap_or_else(|| model.orders.equation()))
+            }
             Self::Equations(_)
             | Self::NonlinearArx(_)
             | Self::Process(_)
@@ -449,7 +458,10 @@ impl Model {
     /// What it is called: structure and orders, such as ARX(2, 2, 1), or how many states the equations have.
     pub fn name(&self) -> String {
         match self {
-            Self::Polynomial(model) => model.orders.to_string(),
+            Self::Polynomial(model) => match &model.factors {
+                Some(factors) => factors.orders.to_string(),
+                None => model.orders.to_string(),
+            },
             Self::Equations(model) => {
                 let count = model.states.len();
                 format!("equations, {count} state{}", if count == 1 { "" } else { "s" })

@@ -4,7 +4,7 @@ use thetahat_numerics::optimize::Algorithm;
 
 use super::words::{
     CoupleWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord, ModelWord,
-    NormOption, StepOption,
+    NormOption, OrderOption, SeasonalOption, StepOption,
 };
 use crate::data::{Detrend, Prefilter, Rows, Split};
 use crate::estimate::{Bound, Constant, GainBound, Initial, Refine, Weighting};
@@ -14,12 +14,14 @@ use crate::select::{Focus, OrderRange, Path, Select};
 
 const CHANNELS: &str = "Channels";
 const MODEL: &str = "Model";
+const SEASONS: &str = "Seasonal ARIMA (`model` arima)";
 const STATES: &str = "State space (`model` ss)";
 const NARX: &str = "Nonlinear ARX";
 const CHOICE: &str = "Choice (orders that are ranges, or not given)";
 const SEARCH: &str = "Search (models with C, D or F, in equations, and trained)";
 const CRITERION: &str = "Criterion (all but `norm` for models without C, D and F)";
 
+const A: Kind = Kind::ARIMA;
 const P: Kind = Kind::POLYNOMIAL;
 const I: Kind = Kind::IMPULSE_RESPONSE;
 const S: Kind = Kind::STATE_SPACE;
@@ -48,13 +50,13 @@ options! {
     /// ```
     FitOptions of "a fit" {
         /// Input columns; a name that holds a comma stands between double quotes, as in CSV
-        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R];
+        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R A];
         /// Output column; with `model` ss, `model` arx and `narx` one or more
-        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N];
+        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A];
         /// Rows to estimate on, 1-based and inclusive, counted through all logs
-        estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E];
+        estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E A];
         /// Rows to validate on
-        validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N E];
+        validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N E A];
         /// What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the first K
         /// rows); `constant` and `trend` estimate the remaining level and slope of the output
         detrend: Option<Detrend>, "WHAT", "mean", CHANNELS, [P I S V N];
@@ -65,7 +67,7 @@ options! {
         prefilter: Option<Prefilter>, "LOW..HIGH", "", CHANNELS, [P I];
         /// The model structure
         model: Option<ModelWord>, "MODEL", "arx; without orders the data choose; with several outputs and no orders ss", MODEL,
-            [P I S V C R];
+            [P I S V C R A];
         /// Coefficients of A: past outputs
         na: Option<OrderRange>, "N|A..B", "", MODEL, [P V];
         /// Which past outputs each output of an ARX model depends on: full, those of all outputs; none, its own; auto,
@@ -81,7 +83,7 @@ options! {
         nf: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P];
         /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the
         /// input acts in the same sample
-        nk: Vec<DelayRange>, "N|A..B[,…]", "1; without orders the data choose", MODEL, [P I S V N];
+        nk: Vec<DelayRange>, "N|A..B[,…]", "1, arima 0; without orders the data choose", MODEL, [P I S V N A];
         /// Taps of an impulse response (`model` fir): g(nk), g(nk+1), …; one value for each input or one for all
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
         /// The prior of an impulse response (`model` fir): that it decays and is smooth
@@ -110,12 +112,18 @@ options! {
         /// clearly better free run on held-out rows; for networks and rbf-free simulation where there are inputs
         focus: Option<Focus>, "auto|prediction|simulation|K", "auto", MODEL, [P I S V N];
         /// Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for step
-        /// tests and other logs whose mean is not the operating point of the plant
-        constant: Option<Constant>, "CONSTANT", "auto", MODEL, [P I S V];
-        /// Estimate a slope and the level of the output with the parameters: for drift
-        trend: bool, "", "", MODEL, [P I C];
-        /// The number of states, or a range, from which the least MDL is chosen
-        order: Option<OrderRange>, "N|A..B", "1..20", STATES, [S];
+        /// tests and other logs whose mean is not the operating point of the plant. Of arima, which subtracts no mean:
+        /// auto is yes without differences, and no with them
+        constant: Option<Constant>, "CONSTANT", "auto", MODEL, [P I S V A];
+        /// Estimate a slope and the level of the output with the parameters: for drift; of arima with one difference
+        /// the drift alone
+        trend: bool, "", "", MODEL, [P I C A];
+        /// p,d,q of a seasonal ARIMA model (`model` arima): autoregressive parameters, differences and parameters of
+        /// the moving average. The number of states (`model` ss), or a range, from which the least MDL is chosen
+        order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20", SEASONS, [S A];
+        /// The same over seasons, and the rows that a season has: P,D,Q,s. Inputs, if `input` names any, act on the
+        /// output in the same row unless `nk` says otherwise, and all else is the noise
+        seasonal: Option<SeasonalOption>, "P,D,Q,s", "no seasons", SEASONS, [A];
         /// Past samples from which the states are computed
         past: Option<usize>, "P", "the number with the least AIC, 40 at most", STATES, [S];
         /// Future samples that the states predict
@@ -173,13 +181,13 @@ options! {
         select: Option<Select>, "CRITERION", "mdl", CHOICE, [P N];
         /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted
         /// again to the first two and evaluated on the third; 0 for no such part
-        split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N E];
+        split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N E A];
         /// The search algorithm
-        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R];
+        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R A];
         /// The largest number of iterations from each start
-        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R];
+        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R A];
         /// Stop where the next step would lower the cost by less than this fraction
-        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R];
+        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R A];
         /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l
         step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R];
         /// Search from this many further starts
@@ -187,7 +195,7 @@ options! {
         /// The seed of random starts and of random centres
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
         /// After this time begin no iteration and no search from a further start
-        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R];
+        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R A];
         /// The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is robust to
         /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K =
         /// 1.345 by default); inf, the largest error

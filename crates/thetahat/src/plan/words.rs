@@ -33,6 +33,8 @@ pub enum ModelWord {
     Tf,
     /// State space.
     Ss,
+    /// Seasonal ARIMA.
+    Arima,
 }
 
 words! { ModelWord {
@@ -47,6 +49,7 @@ words! { ModelWord {
     Process "process" "A process in continuous time: gain, lags, dead time, with `structure`",
     Tf "tf" "Transfer functions in continuous time, with `np` and `nz`",
     Ss "ss" "State space: x(t+1) = F x + G u + K e, y = H x + D u + e, with any number of outputs",
+    Arima "arima" "Seasonal ARIMA: a time series, with differences, seasons and inputs, with `order` and `seasonal`",
 }}
 
 impl ModelWord {
@@ -59,6 +62,7 @@ impl ModelWord {
             Self::Fir => Kind::IMPULSE_RESPONSE,
             Self::Process | Self::Tf => Kind::PROCESS,
             Self::Ss => Kind::STATE_SPACE,
+            Self::Arima => Kind::ARIMA,
         }
     }
 }
@@ -67,6 +71,8 @@ impl ModelWord {
 impl Kind {
     /// Polynomials, A y = B/F u + C/D e.
     pub const POLYNOMIAL: Self = Self::new("models of polynomials");
+    /// Seasonal ARIMA.
+    pub const ARIMA: Self = Self::new("`model` arima");
     /// An impulse response.
     pub const IMPULSE_RESPONSE: Self = Self::new("`model` fir");
     /// State space.
@@ -285,6 +291,60 @@ impl OptionText for NormOption {
             Self::Huber { k } => format!("huber:{k}"),
         }
     }
+}
+
+/// The number of states of a model, or a range; or p,d,q of an ARIMA model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OrderOption {
+    /// N or A..B.
+    States(OrderRange),
+    /// p,d,q.
+    Arima([usize; 3]),
+}
+
+impl OptionText for OrderOption {
+    const PYTHON: &'static str = "Union[Order, tuple[int, int, int]]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        if !text.contains(',') {
+            return OrderRange::of(text).map(Self::States);
+        }
+        let found = whole_numbers(text).and_then(|numbers| <[usize; 3]>::try_from(numbers).ok());
+        found.map(Self::Arima).ok_or_else(|| {
+            format!("'{text}': write p,d,q, three whole numbers that are not negative, such as 0,1,1")
+        })
+    }
+
+    fn text(&self) -> String {
+        match self {
+            Self::States(range) => range.text(),
+            Self::Arima([p, d, q]) => format!("{p},{d},{q}"),
+        }
+    }
+}
+
+/// P,D,Q,s of a seasonal ARIMA model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SeasonalOption(pub [usize; 4]);
+
+impl OptionText for SeasonalOption {
+    const PYTHON: &'static str = "tuple[int, int, int, int]";
+
+    fn of(text: &str) -> Result<Self, String> {
+        let found = whole_numbers(text).and_then(|numbers| <[usize; 4]>::try_from(numbers).ok());
+        found.map(Self).ok_or_else(|| {
+            format!("'{text}': write P,D,Q,s, four whole numbers that are not negative, such as 0,1,1,12")
+        })
+    }
+
+    fn text(&self) -> String {
+        let [p, d, q, season] = self.0;
+        format!("{p},{d},{q},{season}")
+    }
+}
+
+fn whole_numbers(text: &str) -> Option<Vec<usize>> {
+    text.split(',').map(|number| number.trim().parse().ok()).collect()
 }
 
 /// C1 or C1,C2: the length of the steps of a gradient search.

@@ -241,7 +241,8 @@ pub fn validate(
         model: model.name(),
         parameters: model.free_parameters(),
         structure: polynomial.map(|model| model.structure),
-        orders: polynomial.map(|model| model.orders.clone()),
+        // The name of a seasonal ARIMA model says what its numbers stand for.
+        orders: polynomial.filter(|model| model.factors.is_none()).map(|model| model.orders.clone()),
         stable: model.stability(),
         driven: on_log.is_driven(),
         white_expected,

@@ -30,6 +30,8 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
             data.rows,
             if output && model.structure == Structure::Oe {
                 "these rows do not count"
+            } else if output && model.factors.is_some() {
+                "the fit goes on through them"
             } else if output && is_exact(report) {
                 "the fit goes on through them, its figures do not"
             } else {
@@ -50,7 +52,12 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
     }
     let procedure = &report.estimation.procedure;
     if let Some(search) = procedure.search() {
-        warnings.extend(search_warnings(search, procedure.exact_likelihood().is_some()));
+        let of = match (&model.factors, procedure.exact_likelihood()) {
+            (Some(_), _) => Bounded::Factors,
+            (None, Some(_)) => Bounded::Likelihood,
+            (None, None) => Bounded::Errors,
+        };
+        warnings.extend(search_warnings(search, of));
     }
     if let Some(search) = procedure.constrained().and_then(|outcome| outcome.search.as_ref()) {
         let iterations = search.costs.len().saturating_sub(1);
@@ -59,7 +66,9 @@ pub(super) fn warnings(report: &Report, model: &PolynomialModel) -> Vec<String> 
     if procedure.regularised().is_some() {
         warnings.extend(cut_off(model));
     }
-    if let Some((pole, zero)) = near_cancellation(model) {
+    // Factors of differences and seasons are close to one another on purpose.
+    let cancels = if model.factors.is_none() { near_cancellation(model) } else { None };
+    if let Some((pole, zero)) = cancels {
         // What A shares with C alone is in the plant all the same.
         let plant_too = pole.polynomial == "a" && zero.polynomial == "c" && !model.inputs.is_empty();
         let remedy = if plant_too {
@@ -102,19 +111,34 @@ fn cut_off(model: &PolynomialModel) -> impl Iterator<Item = String> {
     })
 }
 
-/// What is worth a warning of a search, also for the largest likelihood, in which A must be stable too.
-fn search_warnings(search: &SearchOutcome, of_likelihood: bool) -> Vec<String> {
+/// What must be stable in a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Bounded {
+    /// C and F, for the least errors.
+    Errors,
+    /// A and C, for the largest likelihood.
+    Likelihood,
+    /// The factors of C and D.
+    Factors,
+}
+
+/// What is worth a warning of a search.
+fn search_warnings(search: &SearchOutcome, of: Bounded) -> Vec<String> {
     let (iterations, stopped) = (search.iterations, search.stopped);
-    let bounded = stopped == Stopped::NoDescent && search.stability_bound && !of_likelihood;
+    let bounded = stopped == Stopped::NoDescent && search.stability_bound && of == Bounded::Errors;
     let early = (!bounded).then(|| stopped_early(stopped, iterations, Some(search.gradient_norm))).flatten();
     let mut warnings: Vec<String> = early.into_iter().collect();
     if search.stability_bound {
-        let roots = match of_likelihood {
-            true => {
+        let roots = match of {
+            Bounded::Factors => {
+                "theta or Theta with a root on the unit circle means a difference too many, phi or Phi one too few; its parameters \
+                 have no standard errors"
+            }
+            Bounded::Likelihood => {
                 "A or C has a root on the unit circle; take differences of an output that wanders without a level, and of one that was \
                  differenced too often none; or lower na or nc"
             }
-            false => {
+            Bounded::Errors => {
                 "C or F has a root on the unit circle; the data want an unstable or overdifferenced model, so use arx or armax for an \
                  unstable plant, or lower nc or nf"
             }

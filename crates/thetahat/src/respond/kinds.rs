@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use super::arima::ArimaOnLog;
 use super::equations::EquationsOnLog;
 use super::nonlinear_arx::NonlinearArxOnLog;
 use super::on_log::{OnLog, PolynomialOnLog};
@@ -27,7 +28,10 @@ impl Model {
         fitted: &[Rows],
     ) -> Result<Box<dyn OnLog + 'l>, Error> {
         Ok(match self {
-            Self::Polynomial(model) => Box::new(PolynomialOnLog::new(model, log, rows, asked)?),
+            Self::Polynomial(model) => match &model.factors {
+                Some(factors) => Box::new(ArimaOnLog::new(model, factors, log, rows)?),
+                None => Box::new(PolynomialOnLog::new(model, log, rows, asked)?),
+            },
             Self::Equations(model) => Box::new(EquationsOnLog::new(model, log, rows, fitted)?),
             Self::NonlinearArx(model) => Box::new(NonlinearArxOnLog::new(model, log, rows)?),
             Self::Process(model) => Box::new(ProcessOnLog::new(model, log, rows)?),

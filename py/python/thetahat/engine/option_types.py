@@ -42,11 +42,13 @@ class FitOptions(TypedDict, total=False):
         are inputs [default: auto]
     constant
         Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
-        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
-        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
-        ``"no"``: Never [default: auto]
+        step tests and other logs whose mean is not the operating point of the plant. Of arima, which
+        subtracts no mean: auto is yes without differences, and no with them; ``"auto"``: If it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
     trend
-        Estimate a slope and the level of the output with the parameters: for drift
+        Estimate a slope and the level of the output with the parameters: for drift; of arima with one
+        difference the drift alone
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
         fitted again to the first two and evaluated on the third; 0 for no such part
@@ -108,6 +110,51 @@ class FitOptions(TypedDict, total=False):
     noise_bound: Optional[float]
 
 
+class ArimaOptions(TypedDict, total=False):
+    """What a fit of a seasonal ARIMA model can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    constant
+        Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
+        step tests and other logs whose mean is not the operating point of the plant. Of arima, which
+        subtracts no mean: auto is yes without differences, and no with them; ``"auto"``: If it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
+    trend
+        Estimate a slope and the level of the output with the parameters: for drift; of arima with one
+        difference the drift alone
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for no such part
+    search
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        found [default: lm]
+    max_iterations
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    time_limit
+        After this time begin no iteration and no search from a further start
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    constant: Optional[Literal["auto", "yes", "no"]]
+    trend: Optional[bool]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    time_limit: Optional[float]
+
+
 class ImpulseResponseOptions(TypedDict, total=False):
     """What a fit of an impulse response can be told.
 
@@ -144,11 +191,13 @@ class ImpulseResponseOptions(TypedDict, total=False):
         are inputs [default: auto]
     constant
         Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
-        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
-        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
-        ``"no"``: Never [default: auto]
+        step tests and other logs whose mean is not the operating point of the plant. Of arima, which
+        subtracts no mean: auto is yes without differences, and no with them; ``"auto"``: If it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
     trend
-        Estimate a slope and the level of the output with the parameters: for drift
+        Estimate a slope and the level of the output with the parameters: for drift; of arima with one
+        difference the drift alone
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
         fitted again to the first two and evaluated on the third; 0 for no such part
@@ -214,9 +263,10 @@ class StateSpaceOptions(TypedDict, total=False):
         are inputs [default: auto]
     constant
         Estimate the level of the output with the parameters, in addition to the mean that is subtracted: for
-        step tests and other logs whose mean is not the operating point of the plant; ``"auto"``: If it
-        lowers MDL, unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always;
-        ``"no"``: Never [default: auto]
+        step tests and other logs whose mean is not the operating point of the plant. Of arima, which
+        subtracts no mean: auto is yes without differences, and no with them; ``"auto"``: If it lowers MDL,
+        unless the output's offset is given (``detrend`` none, ``offset``); ``"yes"``: Always; ``"no"``:
+        Never [default: auto]
     past
         Past samples from which the states are computed [default: the number with the least AIC, 40 at most]
     future
@@ -285,7 +335,8 @@ class ProcessOptions(TypedDict, total=False):
         ``"estimate"``: Measured samples before, and initial conditions estimated with the parameters (models
         with F, processes, or ``likelihood`` exact with inputs) [default: auto]
     trend
-        Estimate a slope and the level of the output with the parameters: for drift
+        Estimate a slope and the level of the output with the parameters: for drift; of arima with one
+        difference the drift alone
     split
         Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
         fitted again to the first two and evaluated on the third; 0 for no such part

@@ -119,7 +119,10 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
     for name, value in arguments.items():
         if value is None:
             continue
-        if name == "linear":
+        if name == "input":
+            # Channels by name, as they are.
+            found[name] = [text(name, one) for one in value]
+        elif name == "linear":
             found["no_linear"] = not flag(name, value)
         elif name == "terms" and isinstance(value, (list, tuple)):
             # The products themselves.
@@ -142,7 +145,7 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
     return json.dumps(found)
 
 
-_ORDERS = frozenset(["na", "nb", "nc", "nd", "nf", "nk", "np", "nu", "ny", "nz", "order", "taps"])
+_ORDERS = frozenset(["na", "nb", "nc", "nd", "nf", "nk", "np", "nu", "ny", "nz", "order", "seasonal", "taps"])
 """The options that are orders: values or ranges, one for all channels or one for each."""
 
 
@@ -151,6 +154,9 @@ def _orders(name: str, value: Any) -> list[str]:
         value = value.tolist()
     if not isinstance(value, (list, tuple)):
         return [_order(name, value)]
+    if (name, len(value)) in (("order", 3), ("seasonal", 4)):
+        # p, d, q and P, D, Q, s.
+        return [",".join(_order(name, one) for one in value)]
     if name not in ("nb", "nf", "nk", "np", "nu", "ny", "nz", "taps"):
         raise TypeError(f"{name}: expected an int or a range such as range(1, 4), found {_numbers.shown(value)}")
     texts = [_order(name, one) for one in value]

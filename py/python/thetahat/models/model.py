@@ -36,7 +36,7 @@ class Model(ConvertibleModel, KnownModels):
     Polynomials are written in rising powers of q^-1, which delays by one sample: ``b[j][i]`` multiplies u_j(t - i). Signals
     go in and come out in the units of the log; the offsets that were removed before the fit are part of the model.
 
-    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`, `fir`, `process`, `iv`, `sriv`, `search` and `from_json`; of numbers that
+    Models are made by `arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `arima`, `general`, `fir`, `process`, `iv`, `sriv`, `search` and `from_json`; of numbers that
     are known by `from_polynomials`, `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy`. They do not change; they
     pickle and copy.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import erfc, sqrt
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -177,7 +177,8 @@ class ReportedModel(Table):
 
     @property
     def parameter_names(self) -> list[str]:
-        """Such as ``a1`` or ``b3``: the letter of the polynomial and the power of q^-1."""
+        """Such as ``a1`` or ``b3``: the letter of the polynomial and the power of q^-1; of a seasonal ARIMA model such as ``ma1`` and
+        ``sma12``."""
         return [parameter["name"] for parameter in self._entries]
 
     @property
@@ -187,12 +188,17 @@ class ReportedModel(Table):
 
     @property
     def _entries(self) -> list[dict[str, Any]]:
-        return list(self._own.get("parameters", []))
+        return list(self._uncertain.get("parameters", []))
+
+    @property
+    def _uncertain(self) -> dict[str, Any]:
+        """What holds the parameters and their covariance: of a seasonal ARIMA model its factors."""
+        return cast("dict[str, Any]", self._own.get("factors", self._own))
 
     @property
     def covariance(self) -> Array | None:
         """The covariance matrix of the parameters, shape (p, p); None where no theory gives one."""
-        covariance = self._own.get("covariance")
+        covariance = self._uncertain.get("covariance")
         return None if covariance is None else np.array(covariance).reshape(2 * (len(self._entries),))
 
     def confidence_interval(self, level: float = 0.95) -> Array:

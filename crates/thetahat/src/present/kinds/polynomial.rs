@@ -17,15 +17,19 @@ const NO_ROOT_ERROR: &str =
 
 pub(super) fn present(on: &mut Sections, report: &Report, model: &PolynomialModel) {
     on.section("Model");
-    on.line(format!("{}, sample time {}", formula(&model.orders), seconds(model.sample_time)));
+    let what = if model.factors.is_some() { report.model.headline() } else { formula(&model.orders) };
+    on.line(format!("{what}, sample time {}", seconds(model.sample_time)));
     signals(on, &model.inputs, std::slice::from_ref(&model.output));
     on.gap();
     let given = report.estimation.procedure.is_given();
-    on.table(parameters(&model.parameters).without(if given { &[2] } else { &[] }));
+    on.table(parameters(report.model.parameters()).without(if given { &[2] } else { &[] }));
     samples(on, &report.estimation, model.noise_variance, &model.output);
     procedure(on, report);
-    on.gap();
-    dynamics(on, model);
+    let seasonal = model.factors.is_some();
+    if on.is_page() || !(seasonal && model.inputs.is_empty()) {
+        on.gap();
+        dynamics(on, model);
+    }
     responses(on, report, true);
     closing(on, report);
 }
@@ -64,7 +68,8 @@ fn dynamics(on: &mut Sections, model: &PolynomialModel) {
     model.zeros.iter().flatten().filter(|_| on.is_page() || !ends).for_each(|zero| add("zero", zero, None));
     model.noise_poles.iter().for_each(|pole| add("noise pole", pole, None));
     model.noise_zeros.iter().for_each(|zero| add("noise zero", zero, None));
-    if !roots.rows.is_empty() {
+    // Those of seasons lie on circles, many of them, and say no more than the factors do.
+    if !roots.rows.is_empty() && (on.is_page() || model.factors.is_none()) {
         on.table(roots);
     }
     static_gains(on, model);

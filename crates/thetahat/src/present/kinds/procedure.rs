@@ -78,6 +78,8 @@ pub(super) fn procedure(on: &mut Sections, report: &Report) {
                 outcome(&found.search),
                 match start {
                     Initial::Estimate => initial(Initial::Estimate, found.search.initial_conditions),
+                    _ if report.model.as_polynomial().is_some_and(|model| model.factors.is_some()) =>
+                        "differences stationary from the first one on".to_owned(),
                     _ if inputs.is_empty() => "stationary from the first sample on".to_owned(),
                     _ => "stationary, and inputs at rest before the first sample".to_owned(),
                 }

@@ -75,7 +75,7 @@ def test_the_airline_model_is_that_of_statsmodels() -> None:
     ahead = model.forecast(log, steps=36)
     assert np.allclose(ahead.values, expected.predicted_mean, rtol=1e-6)
     assert np.allclose(ahead.standard_deviations, expected.se_mean, rtol=1e-6)
-    low, high = ahead.interval(0.95)
+    low, high = ahead.interval(0.95).T
     assert np.allclose(np.column_stack([low, high]), expected.conf_int(0.05), rtol=1e-6)
     assert np.isclose((high - low)[0] / 2, norm.ppf(0.975) * ahead.standard_deviations[0])
     assert np.all(np.diff(ahead.standard_deviations) > 0)

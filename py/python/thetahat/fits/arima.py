@@ -96,8 +96,9 @@ def arima(
     >>> np.exp(ahead.values).round()
     array([450., 426., 479.])
     >>> np.exp(ahead.interval(0.95)).round()
-    array([[419., 391., 436.],
-           [484., 463., 526.]])
+    array([[419., 484.],
+           [391., 463.],
+           [436., 526.]])
     """
     for name, values, count in (("order", order, 3), ("seasonal", seasonal, 4)):
         if values is not None and (isinstance(values, str) or len(values) != count):

@@ -226,3 +226,10 @@ def test_what_makes_no_sense_is_refused() -> None:
         th.arima(th.Log(np.full(50, 3.0), sample_time=1), order=(0, 1, 1))
     with pytest.raises(th.EstimationError, match="differencing takes it"):
         th.arima(th.Log(y, np.full(144, 2.0), sample_time=1), order=(0, 1, 1))
+
+
+def test_one_output_is_fitted() -> None:
+    y = np.cumsum(np.random.default_rng(1).standard_normal((200, 2)), axis=0)
+    with pytest.raises(ValueError, match=r"log: it has 2 outputs \(y1, y2\), and the model one"):
+        th.arima(th.Log(y, sample_time=1), (1, 1, 1))
+    assert th.arima(th.Log(y, sample_time=1).select(output="y2"), (1, 1, 0), (0, 0, 0, 0)).name == "ARIMA(1, 1, 0)"

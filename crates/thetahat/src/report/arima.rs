@@ -97,7 +97,7 @@ impl ArimaPlan {
         if self.inputs.is_empty() && self.orders.parameters() == 0 && integrations == 0 {
             return Err(Error::argument(
                 "order",
-                "0,0,0 is white noise about a constant: there is no model to fit; raise p, d or q, or name an `input`",
+                "0,0,0 is white noise about a constant: there is no model to fit; raise p, d or q, or name `input`",
             ));
         }
         Ok(())

@@ -9,7 +9,7 @@ from thetahat.engine import options as _options
 from thetahat.engine.option_types import ArimaOptions
 from thetahat.engine.values import Orders
 from thetahat.fits.fit import fitted
-from thetahat.logs.log import Log
+from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
 if TYPE_CHECKING:
@@ -103,5 +103,8 @@ def arima(
     for name, values, count in (("order", order, 3), ("seasonal", seasonal, 4)):
         if values is not None and (isinstance(values, str) or len(values) != count):
             raise ValueError(f"{name}: give {count} numbers, such as {'(0, 1, 1)' if count == 3 else '(0, 1, 1, 12)'}, found {values!r}")
+    data = handle("log", log)
+    if len(data.outputs) > 1:
+        raise ValueError(f"log: it has {len(data.outputs)} outputs ({', '.join(data.outputs)}), and the model one; take it with log.select(output=...)")
     own = {"model": "arima", "order": order, "seasonal": seasonal, "nk": nk, "input": list(log.inputs) or None}
     return fitted(log, own, options)

@@ -340,6 +340,19 @@ impl Graph {
         self.operations.iter().zip(&alive).any(|(operation, alive)| *alive && on(*operation))
     }
 
+    /// Whether these are made of a branch or a sign that any node of this kind decides: of a jump derivatives say
+    /// nothing.
+    pub(super) fn jumps(&self, roots: &[Node], on: impl Fn(Operation) -> bool) -> bool {
+        let alive = self.alive(roots);
+        let decided = self.operations.iter().zip(&alive).filter(|(_, alive)| **alive);
+        let deciding = decided.filter_map(|(operation, _)| match operation {
+            Operation::Choose([a, b, ..]) => Some([*a, *b]),
+            Operation::Apply(Function::Sign, x) => Some([*x; 2]),
+            _ => None,
+        });
+        self.depends(&deciding.flatten().collect::<Vec<_>>(), on)
+    }
+
     /// The nodes that these are made of.
     pub(super) fn alive(&self, roots: &[Node]) -> Vec<bool> {
         let mut alive = vec![false; self.operations.len()];

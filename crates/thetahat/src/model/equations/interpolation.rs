@@ -7,9 +7,9 @@
 //! f(x) = sum_i v_i H_i(x) + m_i G_i(x)
 //! ```
 //!
-//! and one of straight lines sum_i v_i H_i(x) with hats H_i. Whatever of v and m is known goes into one table of numbers;
-//! the others are factors of a basis function each, which has up to four knots. As slopes are nodes like others, derivatives by
-//! unknown values are exact, those through the slopes too.
+//! and one of straight lines sum_i v_i H_i(x) with hats H_i. Whatever of v and m is known goes into one table of
+//! numbers; the others are factors of a basis function each, which has up to four knots. As slopes are nodes like
+//! others, derivatives by unknown values are exact, those through the slopes too.
 
 use super::graph::{Graph, Node};
 use super::table::Table;
@@ -56,16 +56,16 @@ pub(super) fn interpolated(graph: &mut Graph, shape: Shape, x: Node, knots: &[f6
 }
 
 /// The slopes at the knots with which cubics are monotone wherever the values are (conditions: Fritsch and Carlson,
-/// Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17, 1980; these slopes: Fritsch and Butland, A method for
-/// constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984), as PCHIP programs take
-/// them. With the chords d_i over steps h_i, between two of them
+/// Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17, 1980; these slopes: Fritsch and Butland, A method
+/// for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984), as PCHIP programs
+/// take them. With the chords d_i over steps h_i, between two of them
 ///
 /// ```text
 /// m_i = (w + w') / (w/d_(i-1) + w'/d_i)     w = 2 h_i + h_(i-1), w' = h_i + 2 h_(i-1)      if d_(i-1) d_i > 0, else 0
 /// ```
 ///
-/// and at an end the slope of the parabola through three points, e = ((2 h_0 + h_1) d_0 - h_0 d_1)/(h_0 + h_1): 0 if its sign
-/// is not that of d_0, and no steeper than 3 d_0 where d_0 and d_1 have different signs.
+/// and at an end the slope of the parabola through three points, e = ((2 h_0 + h_1) d_0 - h_0 d_1)/(h_0 + h_1): 0 if
+/// its sign is not that of d_0, and no steeper than 3 d_0 where d_0 and d_1 have different signs.
 fn slopes(graph: &mut Graph, knots: &[f64], values: &[Node]) -> Vec<Node> {
     let h: Vec<f64> = knots.windows(2).map(|knots| knots[1] - knots[0]).collect();
     let d: Vec<Node> = values

@@ -9,7 +9,8 @@ use thetahat_core::Number;
 /// ```
 ///
 /// and beyond the first and the last knot it is its value there. A derivative at a knot between two pieces is that of
-/// the piece to its right, at the first and the last knot that of the only piece there. Evaluating it is a binary search.
+/// the piece to its right, at the first and the last knot that of the only piece there. Evaluating it is a binary
+/// search.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Table {
     /// At least two, rising.

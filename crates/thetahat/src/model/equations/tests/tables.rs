@@ -244,3 +244,26 @@ fn a_table_is_looked_up_without_allocating() {
     // (1 - 4)/(0.1 + exp(0)) in a tenth of a second.
     near(next[1], 16.0 - 0.3 / 1.1);
 }
+
+#[test]
+fn what_jumps_is_not_linear() {
+    let of = |through: &str| {
+        let force = format!("({through} - damping * velocity)");
+        GreyBox::from_toml(&CART.replacen("(force - damping * velocity)", &force, 1)).unwrap()
+    };
+    assert!(of("force").superposes() && of("(if damping > 1 then 2 * force else force)").superposes());
+    for through in [
+        "(if force > 0 then 1 else -1)",
+        "(if force > 0 then force + 1 else force)",
+        "sign(force)",
+        "(if t > 5 then 1 else 0)",
+        "sat(force, -1, 1)",
+        "lines(force; -1:-1, 1:1)",
+        "(if position > 0 then 1 else -1)",
+    ] {
+        assert!(!of(through).superposes(), "{through}");
+    }
+    let known = |through: &str| of(through).with_parameters(&[("mass", 2.0)]).unwrap().is_linear();
+    assert!(known("force") && known("(if force > 0 then 1 else -1)"));
+    assert!(!known("(if position > 0 then 1 else -1)") && !known("dead(position, -1, 1)"));
+}

@@ -1,7 +1,7 @@
 """System identification: models of dynamic systems from logged data.
 
 A log holds measured signals (`Log`, `read_log`, `read_csv`; `topics` lists those of a flight). A fit makes a model of it (`arx`, `armax`, `oe`, `bj`, `ar`, `arma`, `general`,
-`fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
+`fir`, `iv`, `sriv`), `fit` takes the model that the data ask for, `search` chooses among those of ranges of orders, `fit_many` does it with many logs, `grey` finds the parameters of a model in equations (`GreyBox`, with look-up tables by `table` and branches by `where`), `narx` fits nonlinear ARX models, `process` processes in continuous time, `tf` transfer functions there, `ss` models in state space with any number of outputs, `inspect` inspects a log before a fit, `spectrum` finds its frequency response and `step_test` what its steps show without a model, `design` makes test signals for experiments, `tune` controllers for a process, `pole_placement`, `lqr` and `minimum_variance` controllers for any linear model, which `closed_loop` runs. A `Model` predicts, simulates, forecasts and is validated.
 `NormalEquations` make one model from many pieces of a log that is larger than memory.
 `thetahat.plot` draws, and `thetahat.sklearn` fits into scikit-learn.
 
@@ -72,6 +72,7 @@ from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
 from thetahat.fits.comparison import Comparison, compare
+from thetahat.fits.expressions import table, where
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
 from thetahat.fits.grey_box import GreyBox, grey
 from thetahat.fits.instrumental import iv, sriv
@@ -195,9 +196,11 @@ __all__ = [
     "sriv",
     "ss",
     "step_test",
+    "table",
     "tf",
     "topics",
     "tune",
+    "where",
 ]
 
 _LATER = ("dask", "plot", "sklearn")

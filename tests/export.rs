@@ -217,6 +217,33 @@ fn models_in_equations_say_what_the_library_does() {
     goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
 }
 
+/// Takes 10 s: as above, with tables of known and found values, branches and limits.
+#[test]
+fn tables_and_branches_say_what_the_library_does() {
+    let folder = Folder::with_log(include_str!("data/dc_motor.csv"));
+    folder.write(
+        "motor.toml",
+        "sample_time = 0.01
+         [states]
+         speed = { start = 0, sd = 1 }
+         [inputs]
+         voltage = 'u'
+         [parameters]
+         gain = { start = 10, sd = 10, unknown = true }
+         low = { start = 0.5, sd = 1, unknown = true }
+         middle = 2
+         [next]
+         speed = 'speed + dt * 10 * (table(dead(voltage, -0.1, 0.1); -9:-9, -2:-middle, 1:low, 9:9) * gain - speed)'
+         [outputs]
+         speed = 'speed + lines(speed; -20:0, 0:-0.1, 7:0.4) + if speed > 5 within 2 then 0.1 else sat(speed, -1, 1)'
+         [noise]
+         process = { speed = 1 }
+         measurement = { speed = 1 }",
+    );
+    folder.done("fit --grey motor.toml log.csv --time t --max-iterations 3 --report r.json");
+    goes_round(&folder, "r.json", "log.csv --time t", &["simulator", "predictor", "observer"]);
+}
+
 /// Equations of so many states and inputs, random but stable, with a log along which they run.
 fn random_equations(seed: u64) -> (String, String) {
     let mut random = Random::new(seed);

@@ -64,6 +64,7 @@ mod spectrum;
 mod state_space;
 mod step;
 mod stream;
+mod tables_and_branches;
 mod terminal;
 mod track;
 mod track_live;

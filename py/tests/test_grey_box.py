@@ -309,3 +309,186 @@ def test_states_and_parameters_keep_the_order_in_which_they_were_given() -> None
     assert (box.states, box.unknown) == (["slow", "fast"], ["tau", "gain"])
     again = th.GreyBox(box.to_dict())
     assert (again.states, again.unknown) == (box.states, box.unknown)
+
+
+OCV = ([0.0, 0.1, 0.3, 0.6, 0.9, 1.0], [3.0, 3.45, 3.6, 3.75, 4.0, 4.2])
+
+
+def cell_log(rows: int = 600, seed: int = 5) -> th.Log:
+    """A cell that is discharged and charged, whose voltage at rest goes by straight lines; its resistance is 0.02 Ohm."""
+    rng = np.random.default_rng(seed)
+    current, charge, level = np.zeros(rows), np.zeros(rows), 0.95
+    for t in range(rows):
+        if t % 20 == 0:
+            goal = 0.95 - 0.9 * (t + 20) / rows
+            current[t : t + 20] = 10 * (goal - level) + 0.3 * rng.uniform(-1, 1)
+        charge[t] = level
+        level += current[t] / 200
+    v = np.interp(charge, *OCV) + 0.02 * current + 0.005 * rng.standard_normal(rows)
+    assert charge.min() < 0.1 and charge.max() > 0.92 and np.sum(current > 0) > 50
+    return th.Log(v, current, sample_time=1, input_names=["i"], output_name="v")
+
+
+def cell(outputs: Any, **parameters: Any) -> th.GreyBox:
+    return th.GreyBox.from_functions(
+        sample_time=1,
+        states={"soc": (0.95, 0.0)},
+        inputs={"current": "i"},
+        parameters={"r0": {"start": 0.05, "sd": 0.05, "unknown": True, "min": 0}, **parameters},
+        next=lambda x, u, p, dt: {"soc": x.soc + dt * u.current / 200},
+        outputs=lambda x, u, p: {"v": outputs(x, u, p)},
+        measurement={"v": 0.005},
+    )
+
+
+def test_tables_of_numpy_and_ours_are_fitted() -> None:
+    log = cell_log()
+    boxes = [
+        cell(lambda x, u, p: np.interp(x.soc, *OCV) + p.r0 * u.current),
+        cell(lambda x, u, p: th.table(x.soc, *OCV, method="linear") + p.r0 * u.current),
+    ]
+    assert boxes[0] == boxes[1]
+    model = th.grey(log, boxes[0])
+    assert abs(model.parameters[0] - 0.02) < 3 * model.standard_errors[0] < 0.01
+    # Charge and resistance are told apart by cubics too, though these are not the cell's lines.
+    assert abs(th.grey(log, cell(lambda x, u, p: th.table(x.soc, *OCV) + p.r0 * u.current)).parameters[0] - 0.02) < 0.02
+    # All values but the first are unknown.
+    names = [f"v{i}" for i in range(1, 6)]
+    unknown = {name: {"start": 3.7, "sd": 0.5, "unknown": True} for name in names}
+    learned = th.grey(
+        log, cell(lambda x, u, p: np.interp(x.soc, OCV[0], [3.0, *(p[name] for name in names)]) + p.r0 * u.current, **unknown)
+    )
+    assert learned.parameter_names == ["r0", *names]
+    truth = np.array([0.02, *OCV[1][1:]])
+    assert np.all(np.abs(learned.parameters - truth) < 3 * learned.standard_errors)
+
+
+def test_branches_of_numpy_and_ours_are_fitted() -> None:
+    log = cell_log()
+    # Another resistance for each direction, written in three ways.
+    forms = [
+        lambda x, u, p: np.where(u.current < 0, 3.7 + p.r0 * u.current, 3.7 + p.r1 * u.current),
+        lambda x, u, p: th.where(~(u.current >= 0), p.r0, p.r1) * u.current + 3.7,
+        lambda x, u, p: 3.7 + p.r0 * np.clip(u.current, -9, 0) + p.r1 * np.clip(u.current, 0, None),
+    ]
+    likelihoods = []
+    for form in forms:
+        box = cell(form, r1={"start": 0.1, "sd": 0.1, "unknown": True})
+        likelihoods.append(th.grey(log, box).log_likelihood)
+    assert np.allclose(likelihoods, likelihoods[0], rtol=1e-9)
+
+    rng = np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1, 1, 60), 10)
+    through = np.where(u > 0.3, u - 0.3, np.where(u < -0.2, u + 0.2, 0.0))
+    flow = np.zeros(600)
+    for t in range(1, 600):
+        flow[t] = 0.8 * flow[t - 1] + 0.5 * through[t - 1]
+    valve = th.GreyBox.from_functions(
+        sample_time=1,
+        states={"flow": (0, 0.01)},
+        inputs=["u"],
+        parameters={
+            "low": {"start": -0.1, "sd": 0.2, "unknown": True, "max": 0},
+            "high": {"start": 0.1, "sd": 0.2, "unknown": True, "min": 0},
+            "gain": {"start": 1, "sd": 1, "unknown": True},
+        },
+        next=lambda x, u, p, dt: {
+            "flow": 0.8 * x.flow + p.gain * th.where(u.u > p.high, u.u - p.high, th.where(u.u < p.low, u.u - p.low, 0))
+        },
+        outputs=lambda x, u, p: {"y": x.flow},
+        process={"flow": 0.001},
+        measurement={"y": 0.02},
+    )
+    model = th.grey(th.Log(flow + 0.02 * rng.standard_normal(600), u, sample_time=1), valve)
+    assert np.all(np.abs(model.parameters - [-0.2, 0.3, 0.5]) < 3 * model.standard_errors)
+
+
+def test_conditions_and_tables_as_text() -> None:
+    def text(form: Any) -> str:
+        return str(cell(form).to_dict()["outputs"]["v"])
+
+    cases: list[tuple[Any, str]] = [
+        (lambda x, u, p: th.where(x.soc > 0.5, 1, p.r0), "(if soc > 0.5 then 1.0 else r0)"),
+        (lambda x, u, p: th.where(0.5 >= x.soc, 1, 2, width=0.1), "(if soc <= 0.5 within 0.1 then 1.0 else 2.0)"),
+        (
+            lambda x, u, p: np.where((x.soc > 0) & (x.soc < 1), 1, 2),
+            "(if soc > 0.0 then (if soc < 1.0 then 1.0 else 2.0) else 2.0)",
+        ),
+        (
+            lambda x, u, p: np.where(np.logical_or(x.soc < 0, x.soc > 1), 1, 2),
+            "(if soc < 0.0 then 1.0 else (if soc > 1.0 then 1.0 else 2.0))",
+        ),
+        (lambda x, u, p: th.where(True, x.soc, 2), "soc"),
+        (lambda x, u, p: np.clip(x.soc, None, 1.0), "min(soc, 1.0)"),
+        (lambda x, u, p: np.clip(x.soc, p.r0, 1), "sat(soc, r0, 1.0)"),
+        (
+            lambda x, u, p: np.interp(x[0] * 2, [0, 1], np.array([3, 4]), left=9),
+            "(if (soc * 2.0) < 0.0 then 9.0 else lines((soc * 2.0); 0.0:3.0, 1.0:4.0))",
+        ),
+        (lambda x, u, p: th.table(x["soc"], [-1, 1], [p["r0"], -p.r0]), "table(soc; (-1.0):r0, 1.0:(-r0))"),
+        (lambda x, u, p: sum(x) + len(u), "((soc + 0.0) + 1.0)"),
+    ]
+    for form, expected in cases:
+        assert text(form) in (expected, expected.replace("(soc + 0.0)", "(0.0 + soc)")), expected
+
+
+def test_errors_of_functions_name_these_and_their_lines() -> None:
+    def made(**change: Any) -> th.GreyBox:
+        arguments: dict[str, Any] = {
+            "sample_time": 1,
+            "states": {"level": (0, 1), "rate": (0, 1)},
+            "inputs": {"flow": "u"},
+            "parameters": {"area": {"start": 1.0, "sd": 1, "unknown": True}},
+            "next": lambda x, u, p, dt: {"level": x.rate, "rate": u.flow * p.area},
+            "outputs": lambda x, u, p: {"y": x.level},
+            "measurement": {"y": 1.0},
+        }
+        return th.GreyBox.from_functions(**{**arguments, **change})
+
+    def wrong_name(x: Any, u: Any, p: Any, dt: Any) -> Any:
+        level = x.level
+        return {"level": level, "rate": x.rte}
+
+    first = wrong_name.__code__.co_firstlineno
+    cases: list[tuple[Any, type[Exception], str]] = [
+        (
+            wrong_name,
+            AttributeError,
+            rf"^next, which is 'wrong_name' of test_grey_box.py, line {first + 2} \(defined in line {first}\): there is no state 'rte', "
+            "the states are level, rate; did you mean 'rate'",
+        ),
+        (lambda x, u, p, dt: {"level": x.level}, ValueError, "lambda of test_grey_box.py.* the state 'rate' has no equation; it returned level"),
+        (lambda x, u, p, dt: {"level": 0, "rate": 0, "flow": 1}, ValueError, "'flow' is no state, the states are level, rate"),
+        (lambda x, u, p, dt: {"level": x[2], "rate": 0}, IndexError, "there is no state 2, the states are level, rate"),
+        (lambda x, u, p, dt: {"level": x["l"], "rate": 0}, KeyError, "there is no state 'l'"),
+        (lambda x, u, p, dt: {"level": u.u, "rate": 0}, AttributeError, "there is no input 'u', the inputs are flow"),
+        (lambda x, u, p, dt: {"level": x.rate if x.rate > 0 else 0, "rate": 0}, TypeError, "rate > 0.0.*th.where"),
+        (lambda x, u, p, dt: {"level": 0 < x.rate < 1, "rate": 0}, TypeError, "join conditions by &"),
+        (lambda x, u, p, dt: {"level": x.rate > 0, "rate": 0}, TypeError, r"is a condition and no number: use th.where"),
+        (lambda x, u, p, dt: {"level": (x.rate > 0) * 2, "rate": 0}, TypeError, "multiply: .*is a condition"),
+        (lambda x, u, p, dt: {"level": x.rate == 0, "rate": 0}, TypeError, "hardly ever equal"),
+        (lambda x, u, p, dt: {"level": np.inf * x.rate, "rate": 0}, ValueError, "inf is not a finite number"),
+        (lambda x, u, p, dt: {"level": np.floor(x.rate), "rate": 0}, TypeError, "floor: equations have .*np.interp"),
+        (lambda x, u, p, dt: {"level": np.nan_to_num(x.rate), "rate": 0}, TypeError, "nan_to_num: equations have"),
+        (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 1], [1]), "rate": 0}, ValueError, "2 knots, but 1 values"),
+        (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 0], [1, 1]), "rate": 0}, ValueError, "they must rise, but 0 follows 0"),
+        (lambda x, u, p, dt: {"level": th.table(x.rate, [0], [1]), "rate": 0}, ValueError, "at least two"),
+        (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 1], [1, 1], method="x"), "rate": 0}, ValueError, "one of monotone"),
+        (lambda x, u, p, dt: {"level": np.interp(x.rate, [0, 1], [1, x.level]), "rate": 0}, ValueError, "in next\\['level'\\], lines.*of states"),
+        (lambda x, u, p, dt: {"level": np.interp(x.rate, [0, 1], [1, 2], period=3), "rate": 0}, TypeError, "period"),
+        (lambda x, u, p, dt: {"level": th.where(x.rate, 1, 2), "rate": 0}, TypeError, "expected a comparison"),
+    ]
+    for function, kind, words in cases:
+        with pytest.raises(kind, match=words) as caught:
+            made(next=function)
+        assert "next, which is" in str(caught.value)
+    with pytest.raises(ValueError, match=r"^parameters\['area'\]: the unknown parameter 'area' needs 'sd'"):
+        made(parameters={"area": {"start": 1.0, "unknown": True}})
+    with pytest.raises(ValueError, match=r"^states\['level'\]: 'level' is there twice|^parameters\['level'\]: the name 'level'"):
+        made(parameters={"level": 1.0, "area": 1.0})
+    with pytest.raises(AttributeError, match="the model has no parameters"):
+        made(parameters={})
+    assert made(next=lambda x, u, p, dt: {"level": x[1], "rate": x[0]}).to_dict()["next"] == {"level": "rate", "rate": "level"}
+    by_class = type("Plant", (), {"__call__": lambda self, x, u, p: {"y": x.lvl}})()
+    with pytest.raises(AttributeError, match="outputs, which is 'Plant' of test_grey_box.py"):
+        made(outputs=by_class)

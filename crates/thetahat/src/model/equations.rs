@@ -1,15 +1,18 @@
 //! Models of a plant in equations, written by hand in a TOML file, with exact derivatives.
 
+mod branch;
 mod channels;
 mod document;
 mod dynamics;
 mod expression;
 mod fitted;
 mod graph;
+mod interpolation;
 mod linear;
 mod program;
 mod read;
 mod scale;
+mod table;
 #[cfg(test)]
 pub(crate) mod tests;
 
@@ -20,6 +23,7 @@ pub use fitted::EquationsModel;
 pub(crate) use graph::{Function, Operation};
 pub(crate) use program::Program;
 pub(crate) use scale::Scale;
+pub(crate) use table::Table;
 
 use crate::Error;
 
@@ -63,6 +67,17 @@ use crate::Error;
 /// the seconds since the first row. Angles are in rad. `-x^2` is `-(x^2)`, `x^y^z` is `x^(y^z)`. A power whose exponent
 /// is no constant is `exp(y ln x)`, so x must be positive. Where `min`, `max`, `abs` or `sign` has no derivative, it is
 /// that of one side.
+///
+/// **Branches.** `if a > b then c else d`, with `<`, `<=`, `>` or `>=`, is one of both; what follows `else` goes as far
+/// as the expression does. `sat(x, low, high)` keeps x between two limits, `dead(x, low, high)` is 0 between them, x -
+/// low below and x - high above. A width makes them smooth: `if a > b within w then c else d` is (c + d)/2 + (c - d)/2
+/// tanh((a - b)/w), `max(x, 0 within w)` is (x + √(x² + w²))/2, and `abs(x within w)` is √(x² + w²); `min`, `sat` and
+/// `dead` are made of the same `max`. The width is a number above 0, and may be a parameter.
+///
+/// **Tables.** `table(x; 0:3.2, 0.5:3.65, 1:4.1)` goes through values at knots that rise, by cubic polynomials that
+/// rise and fall where the values do (Fritsch and Carlson 1980, with the slopes of Fritsch and Butland 1984: PCHIP),
+/// and `lines(x; 0:3.2, 1:4.1)` by straight lines. Beyond the ends both are held. A value may be made of parameters,
+/// unknown ones too.
 ///
 /// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else
 /// each is one `sample_time`. `[derivative]` gives dx/dt; it is integrated by the classical Runge-Kutta method of order

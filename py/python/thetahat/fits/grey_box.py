@@ -8,7 +8,6 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -18,79 +17,13 @@ from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import EquationsOptions
+from thetahat.fits.expressions import Expression, Names, Written
 from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-_FUNCTIONS = {
-    np.sin: "sin",
-    np.cos: "cos",
-    np.tan: "tan",
-    np.arcsin: "asin",
-    np.arccos: "acos",
-    np.arctan: "atan",
-    np.sinh: "sinh",
-    np.cosh: "cosh",
-    np.tanh: "tanh",
-    np.exp: "exp",
-    np.log: "ln",
-    np.log10: "log10",
-    np.sqrt: "sqrt",
-    np.absolute: "abs",
-    np.sign: "sign",
-    np.arctan2: "atan2",
-    np.minimum: "min",
-    np.maximum: "max",
-}
-_SIGNS = {np.add: "+", np.subtract: "-", np.multiply: "*", np.true_divide: "/", np.power: "^"}
-
-
-class Expression(np.lib.mixins.NDArrayOperatorsMixin):
-    """What a function of a model in equations computes with: a text that grows with each operation.
-
-    It takes part in ``+ - * / **`` and in NumPy's functions; it has no value, so there is no ``if`` on it.
-    """
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def __str__(self) -> str:
-        return self._text
-
-    __repr__ = __str__
-
-    def __array_ufunc__(self, function: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        if method != "__call__" or options:
-            return NotImplemented
-        texts = [_text_of(value) for value in inputs]
-        if function in _SIGNS:
-            return Expression(f"({texts[0]} {_SIGNS[function]} {texts[1]})")
-        if function is np.negative:
-            return Expression(f"(-{texts[0]})")
-        if function is np.positive:
-            return self
-        if function is np.square:
-            return Expression(f"({texts[0]} * {texts[0]})")
-        if function in _FUNCTIONS:
-            return Expression(f"{_FUNCTIONS[function]}({', '.join(texts)})")
-        raise TypeError(f"{function.__name__}: equations have {', '.join(sorted(_FUNCTIONS.values()))} and + - * / **")
-
-    def __bool__(self) -> bool:
-        raise TypeError("an expression has no value to branch on; use np.minimum, np.maximum, np.sign or abs")
-
-    def __float__(self) -> float:
-        raise TypeError("an expression has no value; use NumPy's functions, such as np.sin")
-
-
-def _text_of(value: Any) -> str:
-    if isinstance(value, Expression):
-        return str(value)
-    number = _number("expression", value)
-    return f"({number!r})" if number < 0 else repr(number)
-
 
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -173,7 +106,8 @@ class GreyBox:
             The standard deviation of each output's noise.
         derivative, next : callable
             One of the two. ``derivative(x, u, p)`` gives a dict of dx/dt; ``next(x, u, p, dt)`` one of the states after ``dt`` seconds.
-            ``x``, ``u`` and ``p`` have the states, inputs and parameters as attributes.
+            ``x``, ``u`` and ``p`` have the states, inputs and parameters as attributes, in their order as ``x[0]``, and by name as
+            ``x["level"]``. They take part in NumPy's functions; `thetahat.where` is their ``if``, `thetahat.table` a look-up table.
         inputs : sequence of str, or dict of str to str
             The channels that are inputs, or by the names that the functions use.
         parameters : dict of str to float or dict
@@ -182,6 +116,11 @@ class GreyBox:
             The standard deviation of what a sample adds to each state.
         substeps : int, optional
             Steps of the integration from row to row, of ``derivative``.
+
+        Raises
+        ------
+        ValueError, TypeError, AttributeError, IndexError, KeyError
+            If they are no equations: with the name of the function, its file and line, and what to do.
 
         Examples
         --------
@@ -204,17 +143,7 @@ class GreyBox:
         channels = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
         known = dict(parameters or {})
 
-        def space(names: Mapping[str, Any]) -> SimpleNamespace:
-            return SimpleNamespace(**{name: Expression(name) for name in names})
-
-        spaces = (space(states), space(channels), space(known))
-
-        def equations(what: str, function: Callable[..., Mapping[str, Any]], *more: Any) -> dict[str, str]:
-            found = function(*spaces, *more)
-            if not isinstance(found, Mapping):
-                raise TypeError(f"{what}: it returned {type(found).__name__}; return a dict of names and expressions")
-            return {str(name): _text_of(value) for name, value in found.items()}
-
+        spaces = (Names("state", states), Names("input", channels), Names("parameter", known))
         model: dict[str, Any] = {"sample_time": sample_time}
         if substeps is not None:
             model["substeps"] = substeps
@@ -224,13 +153,20 @@ class GreyBox:
         }
         model["inputs"] = channels
         model["parameters"] = known
+        written = {"outputs": Written("outputs", outputs)}
         if derivative is not None:
-            model["derivative"] = equations("derivative", derivative)
+            written["derivative"] = Written("derivative", derivative)
+            model["derivative"] = written["derivative"].equations(*spaces, of=list(states))
         if next is not None:
-            model["next"] = equations("next", next, Expression("dt"))
-        model["outputs"] = equations("outputs", outputs)
+            written["next"] = Written("next", next)
+            model["next"] = written["next"].equations(*spaces, Expression("dt"), of=list(states))
+        model["outputs"] = written["outputs"].equations(*spaces)
         model["noise"] = {"process": dict(process or {}), "measurement": dict(measurement)}
-        return cls(model)
+        text = _toml(_plain("model", model))
+        try:
+            return cls(text)
+        except ValueError as error:
+            raise ValueError(_without_text(str(error), text, written)) from error
 
     @property
     def sample_time(self) -> float:
@@ -370,6 +306,25 @@ def _inline(value: Any) -> str:
 
 def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _inline(name)
+
+
+def _without_text(message: str, text: str, written: Mapping[str, Written]) -> str:
+    """An error in a text that was made of functions, by these and by arguments."""
+    place = re.match(r"line (\d+), column (\d+): ", message)
+    if not place:
+        return message
+    table, lines = "", text.split("\n")[: int(place[1])]
+    for line in lines:
+        table = line[1:-1] if line.startswith("[") else table
+    key, _, expression = lines[-1].partition(" = ")
+    message = message[place.end() :]
+    if table not in written:
+        return f"{table}[{key!r}]: {message}" if table and expression else message
+    # What is long is cut to what stands around the error; the column counts from 1, and the expression has quotes.
+    at = int(place[2]) - 1 - (len(lines[-1]) - len(expression))
+    begin, end = max(at - 60, 1), min(at + 60, len(expression) - 1)
+    near = f"{'…' if begin > 1 else ''}{expression[begin:end]}{'…' if end < len(expression) - 1 else ''}"
+    return f"{written[table].place()}: in {table}[{key!r}], {near}: {message}"
 
 
 Equations = Union[GreyBox, str, "os.PathLike[str]", Mapping[str, Any]]

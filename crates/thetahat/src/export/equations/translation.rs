@@ -1,9 +1,10 @@
 //! Equations that were compiled, as statements of a program.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::super::program::{Array, Condition, Function, Program, Statement, Value, Variable};
-use crate::model::equations::{Function as Named, Operation, Program as Compiled};
+use crate::model::equations::{Function as Named, Operation, Program as Compiled, Table};
 
 /// Powers up to this one are products.
 const PRODUCTS: i32 = 8;
@@ -28,7 +29,9 @@ pub(super) fn translated(
     let mut uses: HashMap<usize, usize> = HashMap::new();
     let arguments = operations.iter().flat_map(|(_, operation)| operation.arguments().into_iter().flatten());
     arguments.chain(results.iter().copied()).for_each(|place| *uses.entry(place).or_default() += 1);
-    let mut translation = Translation { program, leaves, values: HashMap::new(), statements: Vec::new() };
+    let tables = compiled.tables();
+    let mut translation =
+        Translation { program, leaves, tables, values: HashMap::new(), statements: Vec::new() };
     for (place, operation) in &operations {
         let value = translation.value(*operation);
         let is_leaf = matches!(value, Value::Number(_) | Value::Variable(_) | Value::At(..));
@@ -46,6 +49,7 @@ pub(super) fn translated(
 struct Translation<'a> {
     program: &'a mut Program,
     leaves: &'a Leaves,
+    tables: &'a [Arc<Table>],
     values: HashMap<usize, Value>,
     statements: Vec<Statement>,
 }
@@ -111,11 +115,44 @@ impl Translation<'_> {
                 );
                 chosen.into()
             }
+            Operation::Table(table, order, x) => {
+                let x = self.at(x);
+                match self.tables.get(table).cloned() {
+                    Some(table) => self.looked_up(&table, order, x),
+                    None => f64::NAN.into(),
+                }
+            }
             Operation::Apply(function, x) => {
                 let x = self.at(x);
                 self.applied(function, x)
             }
         }
+    }
+
+    /// A table, or its derivative of some order, as a binary search that is written out: NaN stays NaN.
+    fn looked_up(&mut self, table: &Table, order: u8, x: Value) -> Value {
+        let x = self.named(x);
+        let found = self.named(f64::NAN.into());
+        let ([first, last], knots) = (table.ends(order), table.knots());
+        let (Some(low), Some(high)) = (knots.first(), knots.last()) else { return found.into() };
+        let pieces: Vec<(f64, [f64; 4])> = knots.iter().copied().zip(table.pieces(order)).collect();
+        let set = |value: f64| vec![Statement::Set(found, value.into())];
+        let after = Statement::Choose {
+            condition: Condition::Less((*high).into(), x.into()),
+            then: set(last),
+            otherwise: Vec::new(),
+        };
+        let inside = Statement::Choose {
+            condition: Condition::AtMost(x.into(), (*high).into()),
+            then: searched(&pieces, x, found),
+            otherwise: vec![after],
+        };
+        self.statements.push(Statement::Choose {
+            condition: Condition::Less(x.into(), (*low).into()),
+            then: set(first),
+            otherwise: vec![inside],
+        });
+        found.into()
     }
 
     fn applied(&mut self, function: Named, x: Value) -> Value {
@@ -144,5 +181,28 @@ impl Translation<'_> {
             Named::Abs => Function::Absolute,
         };
         self.program.call(function, vec![x])
+    }
+}
+
+/// Finds the piece of x among some, each with the knot that it begins at, and sets a variable to its polynomial.
+fn searched(pieces: &[(f64, [f64; 4])], x: Variable, found: Variable) -> Vec<Statement> {
+    let (before, after) = pieces.split_at(pieces.len() / 2);
+    match (before, after) {
+        (_, []) => Vec::new(),
+        ([], [(knot, [a, b, c, d]), ..]) => {
+            let s = x - *knot;
+            let value = match [*b, *c, *d] {
+                [0.0, 0.0, 0.0] => (*a).into(),
+                [_, 0.0, 0.0] => s * *b + *a,
+                [_, _, 0.0] => (s.clone() * *c + *b) * s + *a,
+                _ => ((s.clone() * *d + *c) * s.clone() + *b) * s + *a,
+            };
+            vec![Statement::Set(found, value)]
+        }
+        (_, [(knot, _), ..]) => vec![Statement::Choose {
+            condition: Condition::Less(x.into(), (*knot).into()),
+            then: searched(before, x, found),
+            otherwise: searched(after, x, found),
+        }],
     }
 }

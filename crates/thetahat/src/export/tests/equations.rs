@@ -34,7 +34,7 @@ fn same(found: &[f64], expected: &[f64], share: f64) {
     }
 }
 
-const TEXTS: [&str; 2] = [
+const TEXTS: [&str; 3] = [
         "sample_time = 0.1
          [states]
          x = { start = 0.3, sd = 1 }
@@ -67,6 +67,23 @@ const TEXTS: [&str; 2] = [
          [outputs]
          y = 'x + t'
          z = 'ln(2 + x^2) + (1 + x^2)^1.5 - 1/(1 + x^2)^12'
+         [noise]
+         process = { v = 0.05 }
+         measurement = { y = 0.1, z = 0.1 }",
+        "sample_time = 0.1
+         [states]
+         x = { start = 0.3, sd = 1 }
+         v = { start = 0, sd = 1 }
+         [inputs]
+         force = 'u'
+         [parameters]
+         k = { start = 2, sd = 1, unknown = true, min = 0 }
+         [next]
+         x = 'x + dt * v'
+         v = 'v + dt * (dead(force, -0.2, 0.3) - table(x; -2:-3, -0.2:-1, 0:0, 0.1:k, 0.5:2, 2:2) - 0.4 * v)'
+         [outputs]
+         y = 'lines(x + v; -0.5:-1, -0.1:k, 0:0, 0.5:1) + sat(v, -0.1, 0.1 within 0.05)'
+         z = 'if v > 0.1 * k then x else if x <= 0 within 0.1 then v else -v'
          [noise]
          process = { v = 0.05 }
          measurement = { y = 0.1, z = 0.1 }",

@@ -5,11 +5,16 @@
 //! product  = sign (("*" | "/") sign)*
 //! sign     = ("+" | "-") sign | power
 //! power    = operand ("^" sign)?                so that -x^2 = -(x^2) and x^y^z = x^(y^z)
-//! operand  = number | name | function "(" sum ("," sum)* ")" | "(" sum ")"
+//! operand  = number | name | function "(" sum ("," sum)* within? ")" | table | branch | "(" sum ")"
+//! table    = ("table" | "lines") "(" sum ";" sum ":" sum ("," sum ":" sum)* ")"
+//! branch   = "if" sum ("<" | "<=" | ">" | ">=") sum within? "then" sum "else" sum
+//! within   = "within" sum
 //! ```
 //!
 //! Nothing is stored between text and graph: an operator combines two nodes as soon as both are read. What is nested is
 //! counted, so that no text can use up the stack.
+
+mod forms;
 
 use winnow::Parser;
 use winnow::combinator::{Infix, Prefix, expression};
@@ -18,12 +23,13 @@ use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
 use super::document::{quoted, suggestion};
 use super::graph::{Function, Graph, Node};
+use super::interpolation::Shape;
 
 /// How deep an expression may be nested.
 const DEEPEST: usize = 100;
 
 /// Every function with the numbers of its arguments.
-const FUNCTIONS: [(&str, usize); 19] = [
+const FUNCTIONS: [(&str, usize); 23] = [
     ("sin", 1),
     ("cos", 1),
     ("tan", 1),
@@ -42,6 +48,11 @@ const FUNCTIONS: [(&str, usize); 19] = [
     ("sign", 1),
     ("min", 2),
     ("max", 2),
+    ("sat", 3),
+    ("dead", 3),
+    // Of tables what stands before their knots.
+    ("table", 1),
+    ("lines", 1),
     // Refused in words, as it is the natural logarithm in some languages and the decimal one in others.
     ("log", 1),
 ];
@@ -49,9 +60,14 @@ const FUNCTIONS: [(&str, usize); 19] = [
 /// Names that mean something already.
 pub(super) const CONSTANTS: [&str; 3] = ["pi", "t", "dt"];
 
+/// Words of a branch.
+const WORDS: [&str; 4] = ["if", "then", "else", "within"];
+
 /// Whether a name may not be given to a state, an input or a parameter.
 pub(super) fn is_reserved(name: &str) -> bool {
-    CONSTANTS.contains(&name) || FUNCTIONS.iter().any(|(function, _)| *function == name)
+    CONSTANTS.contains(&name)
+        || WORDS.contains(&name)
+        || FUNCTIONS.iter().any(|(function, _)| *function == name)
 }
 
 /// Whether a text can stand in an expression as a name.
@@ -100,6 +116,8 @@ pub(super) fn read(text: &str, graph: &mut Graph, names: &dyn Names) -> Result<N
             Err(fault(&input, "this ')' closes nothing: '(' is missing before it, or it is one too many"))
         }
         Some(',') => Err(fault(&input, "this ',' stands outside of a function's arguments")),
+        Some(';' | ':') => Err(fault(&input, "this stands outside of a table's knots")),
+        Some('<' | '>') => Err(fault(&input, forms::STRAY_COMPARISON)),
         Some('=') => {
             Err(fault(&input, "an expression has no '=': the name to its left is the key of the TOML file"))
         }
@@ -174,6 +192,16 @@ fn taken(input: &mut Input<'_, '_>, letter: char) -> bool {
     let comes = rest(input).starts_with(letter);
     if comes {
         input.input.next_slice(letter.len_utf8());
+    }
+    comes
+}
+
+/// Takes a word, and the blanks before it, if it comes next.
+fn word_taken(input: &mut Input<'_, '_>, wanted: &str) -> bool {
+    blanks(input);
+    let comes = word(rest(input)) == wanted;
+    if comes {
+        input.input.next_slice(wanted.len());
     }
     comes
 }
@@ -279,6 +307,8 @@ fn close(input: &mut Input<'_, '_>, opened: usize) -> Answer<()> {
     let text = rest(input);
     Err(ErrMode::Cut(if text.is_empty() {
         Fault { offset: opened, message: "this '(' is not closed: ')' is missing".to_owned() }
+    } else if text.starts_with(['<', '>']) {
+        fault(input, forms::STRAY_COMPARISON)
     } else {
         fault(input, format!("an operator or ')' is missing before {}", quoted(word(text))))
     }))
@@ -318,7 +348,13 @@ fn name(input: &mut Input<'_, '_>) -> Answer<Node> {
     let name = word(rest(input));
     let start = input.input.current_token_start();
     let refused = |message: String| Err(ErrMode::Cut(Fault { offset: start, message }));
+    if WORDS.contains(&name) && name != "if" {
+        return refused(unexpected(name));
+    }
     input.input.next_slice(name.len());
+    if name == "if" {
+        return forms::branch(input);
+    }
     blanks(input);
     let called = rest(input).starts_with('(');
     let function = FUNCTIONS.iter().find(|(function, _)| *function == name);
@@ -326,7 +362,9 @@ fn name(input: &mut Input<'_, '_>) -> Answer<Node> {
         return refused("'log' is ambiguous: write 'ln' for the natural logarithm, or 'log10'".to_owned());
     }
     match (function, called) {
-        (Some((_, arguments)), true) => function_of(input, name, *arguments, start),
+        (Some(("table", _)), true) => forms::table(input, name, Shape::Monotone, start),
+        (Some(("lines", _)), true) => forms::table(input, name, Shape::Lines, start),
+        (Some((_, arguments)), true) => forms::function(input, name, *arguments, start),
         (Some(_), false) => refused(format!("'{name}' is a function: its argument follows in parentheses")),
         (None, true) => {
             let near = suggestion(name, FUNCTIONS.iter().map(|(function, _)| *function));
@@ -343,54 +381,4 @@ fn name(input: &mut Input<'_, '_>) -> Answer<Node> {
             Err(message) => refused(message),
         },
     }
-}
-
-/// The arguments of a function in parentheses, and the function of them.
-fn function_of(input: &mut Input<'_, '_>, name: &str, wanted: usize, start: usize) -> Answer<Node> {
-    let opened = input.input.current_token_start();
-    input.input.next_slice(1);
-    descend(input)?;
-    let mut arguments = Vec::new();
-    if !taken(input, ')') {
-        arguments.push(sum(input).map_err(cut)?);
-        while taken(input, ',') {
-            arguments.push(sum(input).map_err(cut)?);
-        }
-        close(input, opened)?;
-    }
-    let graph = &mut *input.state.graph;
-    let node = match *arguments.as_slice() {
-        [x] if wanted == 1 => match name {
-            "sin" => graph.apply(Function::Sin, x),
-            "cos" => graph.apply(Function::Cos, x),
-            "tan" => graph.apply(Function::Tan, x),
-            "asin" => graph.apply(Function::Asin, x),
-            "acos" => graph.apply(Function::Acos, x),
-            "atan" => graph.apply(Function::Atan, x),
-            "sinh" => graph.apply(Function::Sinh, x),
-            "cosh" => graph.apply(Function::Cosh, x),
-            "tanh" => graph.apply(Function::Tanh, x),
-            "exp" => graph.apply(Function::Exp, x),
-            "sqrt" => graph.apply(Function::Sqrt, x),
-            "abs" => graph.apply(Function::Abs, x),
-            "sign" => graph.apply(Function::Sign, x),
-            "log10" => {
-                let (logarithm, ten) =
-                    (graph.apply(Function::Ln, x), graph.constant(std::f64::consts::LN_10));
-                graph.divide(logarithm, ten)
-            }
-            _ => graph.apply(Function::Ln, x),
-        },
-        [a, b] if wanted == 2 => match name {
-            "atan2" => graph.atan2(a, b),
-            "min" => graph.choose(a, b, a, b),
-            _ => graph.choose(a, b, b, a),
-        },
-        _ => {
-            let (plural, found) = (if wanted == 1 { "" } else { "s" }, arguments.len());
-            let message = format!("'{name}' takes {wanted} argument{plural}, here it has {found}");
-            return Err(ErrMode::Cut(Fault { offset: start, message }));
-        }
-    };
-    ascend(input, node)
 }

@@ -5,8 +5,11 @@
 //! added: x + 0, 1 x, 0 x, and constants of constants.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use thetahat_core::Number;
+
+use super::table::Table;
 
 /// A node, by its place in the [`Graph`].
 pub(crate) type Node = usize;
@@ -58,6 +61,8 @@ pub(crate) enum Operation {
     Atan2(Node, Node),
     /// c if a <= b, else d; NaN if a or b is.
     Choose([Node; 4]),
+    /// A table, by its place among those of the graph, or its derivative of this order.
+    Table(usize, u8, Node),
 }
 
 impl Operation {
@@ -70,7 +75,9 @@ impl Operation {
             | Self::Input(_)
             | Self::Time
             | Self::Step => [None; 4],
-            Self::Apply(_, x) | Self::Integer(x, _) | Self::Real(x, _) => [Some(x), None, None, None],
+            Self::Apply(_, x) | Self::Integer(x, _) | Self::Real(x, _) | Self::Table(_, _, x) => {
+                [Some(x), None, None, None]
+            }
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
@@ -92,6 +99,7 @@ impl Operation {
             Self::Divide(a, b) => Self::Divide(place(a), place(b)),
             Self::Atan2(a, b) => Self::Atan2(place(a), place(b)),
             Self::Choose(nodes) => Self::Choose(nodes.map(place)),
+            Self::Table(table, order, x) => Self::Table(table, order, place(x)),
             leaf => leaf,
         }
     }
@@ -109,7 +117,12 @@ pub(super) struct Leaves<'a, S> {
 
 /// The value of one operation, given those before it.
 #[inline]
-pub(super) fn value<S: Number<f64>>(operation: Operation, leaves: &Leaves<'_, S>, values: &[S]) -> S {
+pub(super) fn value<S: Number<f64>>(
+    operation: Operation,
+    tables: &[Arc<Table>],
+    leaves: &Leaves<'_, S>,
+    values: &[S],
+) -> S {
     let at = |node: Node| values[node];
     match operation {
         Operation::Constant(bits) => f64::from_bits(bits).into(),
@@ -132,6 +145,7 @@ pub(super) fn value<S: Number<f64>>(operation: Operation, leaves: &Leaves<'_, S>
             Some(order) if order.is_le() => at(c),
             Some(_) => at(d),
         },
+        Operation::Table(table, order, x) => tables[table].value(order, at(x)),
     }
 }
 
@@ -164,6 +178,7 @@ fn applied<S: Number<f64>>(function: Function, x: S) -> S {
 pub(super) struct Graph {
     operations: Vec<Operation>,
     known: HashMap<Operation, Node>,
+    tables: Vec<Arc<Table>>,
 }
 
 impl Graph {
@@ -171,13 +186,17 @@ impl Graph {
     const ZERO: Node = 0;
 
     pub(super) fn new() -> Self {
-        let mut graph = Self { operations: Vec::new(), known: HashMap::new() };
+        let mut graph = Self { operations: Vec::new(), known: HashMap::new(), tables: Vec::new() };
         graph.constant(0.0);
         graph
     }
 
     pub(super) fn operations(&self) -> &[Operation] {
         &self.operations
+    }
+
+    pub(super) fn tables(&self) -> &[Arc<Table>] {
+        &self.tables
     }
 
     fn add_node(&mut self, operation: Operation) -> Node {
@@ -216,7 +235,7 @@ impl Graph {
         };
         let places = |node| arguments.iter().position(|argument| *argument == Some(node)).unwrap_or(0);
         let none = Leaves { states: &[], parameters: &[], inputs: &[], time: 0.0, step: 0.0 };
-        let value = value::<f64>(operation.moved(places), &none, &[a, b, c, d]);
+        let value = value::<f64>(operation.moved(places), &self.tables, &none, &[a, b, c, d]);
         self.constant(value)
     }
 
@@ -295,13 +314,43 @@ impl Graph {
 
     /// c if a <= b, else d.
     pub(super) fn choose(&mut self, a: Node, b: Node, c: Node, d: Node) -> Node {
-        if c == d { c } else { self.combined(Operation::Choose([a, b, c, d])) }
+        match (self.known(a), self.known(b)) {
+            _ if c == d => c,
+            (Some(a), Some(b)) if a <= b => c,
+            (Some(a), Some(b)) if a > b => d,
+            _ => self.combined(Operation::Choose([a, b, c, d])),
+        }
+    }
+
+    /// A table at x.
+    pub(super) fn table(&mut self, table: Table, x: Node) -> Node {
+        if let Some(value) = table.constant() {
+            return self.constant(value);
+        }
+        let place = self.tables.iter().position(|own| **own == table).unwrap_or_else(|| {
+            self.tables.push(Arc::new(table));
+            self.tables.len() - 1
+        });
+        self.combined(Operation::Table(place, 0, x))
     }
 
     /// Whether these are made of any node of this kind.
     pub(super) fn depends(&self, roots: &[Node], on: impl Fn(Operation) -> bool) -> bool {
         let alive = self.alive(roots);
         self.operations.iter().zip(&alive).any(|(operation, alive)| *alive && on(*operation))
+    }
+
+    /// Whether these are made of a branch or a sign that any node of this kind decides: of a jump derivatives say
+    /// nothing.
+    pub(super) fn jumps(&self, roots: &[Node], on: impl Fn(Operation) -> bool) -> bool {
+        let alive = self.alive(roots);
+        let decided = self.operations.iter().zip(&alive).filter(|(_, alive)| **alive);
+        let deciding = decided.filter_map(|(operation, _)| match operation {
+            Operation::Choose([a, b, ..]) => Some([*a, *b]),
+            Operation::Apply(Function::Sign, x) => Some([*x; 2]),
+            _ => None,
+        });
+        self.depends(&deciding.flatten().collect::<Vec<_>>(), on)
     }
 
     /// The nodes that these are made of.
@@ -384,6 +433,13 @@ impl Graph {
                 self.divide(numerator, denominator)
             }
             Operation::Choose([a, b, c, d]) => self.choose(a, b, slopes[c], slopes[d]),
+            Operation::Table(table, order, x) => {
+                if self.tables[table].ends_before(order + 1) {
+                    return Self::ZERO;
+                }
+                let outer = self.combined(Operation::Table(table, order + 1, x));
+                self.multiply(outer, slopes[x])
+            }
         }
     }
 

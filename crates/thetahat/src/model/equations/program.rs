@@ -1,14 +1,18 @@
 //! Some nodes of a graph, as a list of operations to be run from its beginning to its end.
 
+use std::sync::Arc;
+
 use thetahat_core::Number;
 
 use super::graph::{self, Graph, Leaves, Node, Operation};
+use super::table::Table;
 
 /// The operations that some nodes need, in order, and where their values end up.
 #[derive(Debug, Clone)]
 pub(crate) struct Program {
     operations: Vec<Operation>,
     results: Vec<usize>,
+    tables: Vec<Arc<Table>>,
 }
 
 impl Program {
@@ -21,7 +25,13 @@ impl Program {
             places[node] = operations.len();
             operations.push(operation.moved(|argument| places[argument]));
         }
-        Self { operations, results: roots.iter().map(|&root| places[root]).collect() }
+        let results = roots.iter().map(|&root| places[root]).collect();
+        Self { operations, results, tables: graph.tables().to_vec() }
+    }
+
+    /// The tables that the operations name.
+    pub(crate) fn tables(&self) -> &[Arc<Table>] {
+        &self.tables
     }
 
     /// The operations that the first `count` nodes need, each with its place, and the places of these nodes.
@@ -51,7 +61,7 @@ impl Program {
         values: &'s mut [S],
     ) -> impl Iterator<Item = S> + use<'s, S> {
         for (place, &operation) in self.operations.iter().enumerate() {
-            values[place] = graph::value(operation, leaves, values);
+            values[place] = graph::value(operation, &self.tables, leaves, values);
         }
         self.results.iter().map(|&place| values[place])
     }

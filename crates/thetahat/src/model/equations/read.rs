@@ -105,13 +105,14 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     let (observation, second) = functions(&mut graph, &seen, states.len(), unknown.len());
     let mut slopes: Vec<Node> = first.into_iter().chain(second).collect();
     let bends = |operation| matches!(operation, Operation::State(_) | Operation::Parameter(_));
-    let linear = unknown.is_empty() && !graph.depends(&slopes, bends);
-    let moves = |operation| matches!(operation, Operation::State(_) | Operation::Input(_) | Operation::Time);
     let all: Vec<Node> = rates.iter().chain(&seen).copied().collect();
+    let is_state = |operation| matches!(operation, Operation::State(_));
+    let linear = unknown.is_empty() && !graph.depends(&slopes, bends) && !graph.jumps(&all, is_state);
+    let moves = |operation| matches!(operation, Operation::State(_) | Operation::Input(_) | Operation::Time);
     for input in 0..inputs.len() {
         slopes.extend(graph.derivatives(&all, Operation::Input(input)));
     }
-    let superposes = !graph.depends(&slopes, moves);
+    let superposes = !graph.depends(&slopes, moves) && !graph.jumps(&all, moves);
     let any_step = step != Step::Next || graph.depends(&rates, |operation| operation == Operation::Step);
     Ok(GreyBox {
         text: text.to_owned(),

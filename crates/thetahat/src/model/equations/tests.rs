@@ -3,6 +3,7 @@ mod expressions;
 mod linear;
 mod models;
 mod refusals;
+mod tables;
 
 /// A cart that is pushed, with an unknown mass.
 pub(crate) const CART: &str = "\

@@ -12,7 +12,7 @@ use crate::model::{
 };
 
 /// The value of an expression and its derivatives by x, y and a.
-fn evaluated(text: &str, at: [f64; 3]) -> (f64, [f64; 3], [f64; 3]) {
+pub(super) fn evaluated(text: &str, at: [f64; 3]) -> (f64, [f64; 3], [f64; 3]) {
     let mut graph = Graph::new();
     let names = Three::new(&mut graph);
     let node = read(text, &mut graph, &names).unwrap();

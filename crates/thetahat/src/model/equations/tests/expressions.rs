@@ -22,7 +22,7 @@ impl Names for Three {
 }
 
 /// The value of an expression at x = 2, y = 3, a = 0.5.
-fn value(text: &str) -> Result<f64, Fault> {
+pub(super) fn value(text: &str) -> Result<f64, Fault> {
     let mut graph = Graph::new();
     let names = Three::new(&mut graph);
     let node = read(text, &mut graph, &names)?;
@@ -32,7 +32,7 @@ fn value(text: &str) -> Result<f64, Fault> {
     Ok(program.run(&leaves, &mut work).next().unwrap())
 }
 
-fn fault(text: &str) -> (usize, String) {
+pub(super) fn fault(text: &str) -> (usize, String) {
     let fault = value(text).expect_err(text);
     (fault.offset, fault.message)
 }

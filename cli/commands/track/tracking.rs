@@ -172,8 +172,8 @@ impl Tracking {
         done
     }
 
-    /// Takes one row, as [`rows`](Self::rows) takes many, without a copy of where it stood: its values are checked before
-    /// anything changes.
+    /// Takes one row, as [`rows`](Self::rows) takes many, without a copy of where it stood: its values are checked
+    /// before anything changes.
     ///
     /// # Errors
     /// A [`Failure`] if a value is infinite.

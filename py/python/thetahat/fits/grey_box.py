@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import os
 import re
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
-from thetahat.engine import files as _files, options as _options
+from thetahat.engine import files as _files, options as _options, runs as _runs
 from thetahat.engine.option_types import EquationsOptions
 from thetahat.fits.expressions import Expression, Names, Written
 from thetahat.fits.fit import told
@@ -233,8 +232,7 @@ class GreyBox:
         >>> box.simulate([1.0, 1.0, 1.0])
         array([0. , 1. , 1.9])
         """
-        run: NDArray[np.float64] = importlib.import_module("thetahat.online.filter").StateFilter(self).predict(u, steps)
-        return run
+        return _runs.free_run(_thetahat.StateModel.from_grey_box(self._model), u, steps)
 
     def to_toml(self) -> str:
         """The text as it was written."""

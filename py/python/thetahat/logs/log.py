@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, overload
 
@@ -333,7 +333,8 @@ class Log:
         -------
         ndarray of Axes
         """
-        return importlib.import_module("thetahat.plot").log(self, **options)
+        # The package loads its module of drawings when it is asked for one.
+        return sys.modules["thetahat"].plot.log(self, **options)
 
     def to_pandas(self, **columns: npt.ArrayLike) -> Any:
         """A data frame of pandas with the index that the log came with, beside its channels what belongs to its rows.

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from thetahat import _thetahat
 from thetahat.base import clock as _clock, numbers as _numbers, picture as _picture
 from thetahat.base.said import deprecated
-from thetahat.engine import files as _files, options as _options
+from thetahat.engine import files as _files, options as _options, runs as _runs
 from thetahat.engine.values import Duration, Initial
 from thetahat.fits.grey_box import GreyBox
 from thetahat.logs.log import Log
@@ -360,13 +360,7 @@ class StateFilter:
         >>> filter.predict(log.u[900:903]).shape
         (3,)
         """
-        count = len(self.inputs)
-        if u is None:
-            future = np.full((_options.count("steps", 1 if steps is None else steps, 10_000), count), np.nan)
-        else:
-            future = _rows.future(u, count, steps)
-        found = self._filter.predict(future, len(future))
-        return found[:, 0] if found.shape[1] == 1 else found
+        return _runs.predicted(self._filter, len(self.inputs), u, steps)
 
     def run(
         self,

@@ -87,20 +87,6 @@ class Last(NamedTuple):
         return step
 
 
-def future(u: Any, inputs: int, steps: int | None) -> Array:
-    """The inputs of rows to come, shape (steps, inputs)."""
-    values = _numbers.array("u", u)
-    if values.ndim < 2 and inputs == 1:
-        values = values.reshape(-1, 1)
-    if values.ndim != 2 or values.shape[1] != inputs or len(values) == 0:
-        raise ValueError(f"u: expected shape (steps, {inputs}), found {values.shape}")
-    if np.isinf(values).any():
-        raise ValueError("u: it is infinite somewhere; NaN is a missing sample")
-    if steps is not None and _options.count("steps", steps, 10_000) != len(values):
-        raise ValueError(f"steps: {steps} were asked for, and u has {len(values)}; give one of the two")
-    return values
-
-
 def last(rows: Rows) -> Last | None:
     """When the last of them was, where there is a clock."""
     if rows.seconds is None:

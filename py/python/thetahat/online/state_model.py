@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import re
 from collections.abc import Sequence
@@ -13,7 +12,7 @@ import numpy.typing as npt
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
-from thetahat.engine import files as _files, options as _options
+from thetahat.engine import files as _files, options as _options, runs as _runs
 from thetahat.engine.values import Duration
 
 if TYPE_CHECKING:
@@ -207,8 +206,7 @@ class StateModel:
         >>> model.simulate([1.0, 1.0, 1.0])
         array([0. , 1. , 1.9])
         """
-        run: Array = importlib.import_module("thetahat.online.filter").StateFilter(self).predict(u, steps)
-        return run
+        return _runs.free_run(self._model, u, steps)
 
     def __eq__(self, other: object) -> bool:
         return self._text == other._text if isinstance(other, StateModel) else NotImplemented

@@ -14,7 +14,7 @@ from thetahat import _thetahat
 from thetahat._thetahat import Forgetting
 from thetahat.base import clock as _clock, numbers as _numbers
 from thetahat.base.said import deprecated
-from thetahat.engine import files as _files, options as _options
+from thetahat.engine import files as _files, options as _options, runs as _runs
 from thetahat.engine.values import Duration
 from thetahat.models.model import Model
 from thetahat.online import rows as _rows
@@ -320,7 +320,7 @@ class Tracker:
         >>> bool(np.all(np.abs(tracker.predict(log.u[900:905]) - log.y[900:905]) < 10))
         True
         """
-        future = None if u is None else _rows.future(u, len(self.inputs), steps)
+        future = None if u is None else _runs.future(u, len(self.inputs), steps)
         count = len(future) if future is not None else 1 if steps is None else steps
         return shaped(self._tracker, self._tracker.predict(future, _options.count("steps", count, 10_000)), 1)
 

@@ -10,8 +10,8 @@ Logs            `Log`, `read_log`, `read_csv`, `topics` of the log of a flight, 
 Fits            `fit` takes the model that the data ask for, `search` chooses among orders, `fit_many` does it with many logs.
   polynomials   `arx`, `armax`, `oe`, `bj`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
   time series   `arima` with differences and seasons, `ar`, `arma`.
-  others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations, with `table`
-                and `where`.
+  others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations,
+                with `table` and `where`.
 Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
                 `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
                 `compare` lays several side by side.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, Union
 
-from thetahat.base import progress as _progress
-from thetahat.base.progress import Progress
-from thetahat.engine import options as _options
+from thetahat.engine.progress import Progress
+from thetahat.engine import options as _options, progress as _progress
 from thetahat.engine.option_types import NarxOptions
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log

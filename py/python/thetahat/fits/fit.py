@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from thetahat import _thetahat
 from thetahat.base import said as _said
-from thetahat.engine.progress import Progress
 from thetahat.base.said import EstimationWarning
 from thetahat.engine import options as _options, progress as _progress
 from thetahat.engine.option_types import FitOptions, ImpulseResponseOptions
+from thetahat.engine.progress import Progress
 from thetahat.engine.values import Order, Orders
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model

@@ -16,8 +16,8 @@ from typing import Any, Union
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers, said as _said
-from thetahat.engine.progress import Progress
 from thetahat.engine import files as _files, options as _options, progress as _progress
+from thetahat.engine.progress import Progress
 from thetahat.fits.fit import search
 from thetahat.logs.inspection import Inspection
 from thetahat.logs.log import Log

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, Union
 
-from thetahat.engine.progress import Progress
 from thetahat.engine import options as _options, progress as _progress
 from thetahat.engine.option_types import NarxOptions
+from thetahat.engine.progress import Progress
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log
 from thetahat.models.model import Model

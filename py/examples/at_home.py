@@ -65,3 +65,47 @@ for y, u in zip(motor.y[700:900], motor.u[700:900]):
     estimate = filter.update(y, u)
 ahead = np.column_stack([tracker.predict(motor.u[900:910]), filter.predict(motor.u[900:910])])
 assert np.abs(ahead - motor.y[900:910, None]).max() < 15
+
+# %% [markdown]
+# A search that tells how far it is, and warnings that go to a logger.
+
+# %%
+places: list[tuple[int, int | None, float | None]] = []
+with th.warnings_as("log"):
+    chosen = th.search(early, progress=lambda done, total, best: places.append((done, total, best)))
+assert chosen.selection is not None
+print(chosen, chosen.selection.to_pandas().head(3), sep="\n")
+
+# %% [markdown]
+# Monthly sales with a season: differences of a month and of a year, by exact likelihood, and what comes with its interval.
+
+# %%
+rng = np.random.default_rng(0)
+months = pd.date_range("2016-01-01", periods=120, freq="MS")
+seasons = 8 * np.sin(2 * np.pi * np.arange(12) / 12) + np.cumsum(rng.standard_normal((10, 12)), axis=0)
+sales = np.cumsum(0.2 + rng.standard_normal(120)) + seasons.ravel()
+series = th.Log(pd.Series(sales, months, name="sales"))
+seasonal = th.arima(series, order=(0, 1, 1), seasonal=(0, 1, 1, 12))
+year = seasonal.forecast(series, 12)
+print(seasonal.params, year.to_pandas().head(3), sep="\n")
+ax = plot.forecast(series, year)
+
+# %% [markdown]
+# A plant in equations, with a table that a curve is read off: the charge of a battery from its voltage.
+
+# %%
+knots, volts = [0.0, 0.5, 1.0], [3.2, 3.65, 4.1]
+current = np.where(np.arange(600) % 60 < 30, 2.0, 0.0)
+charge = 0.9 - np.concatenate([[0.0], np.cumsum(current[:-1])]) / 3000
+voltage = np.interp(charge, knots, volts) - 0.05 * current + 0.002 * rng.standard_normal(600)
+cell = th.GreyBox.from_functions(
+    sample_time=1,
+    states={"charge": (0.9, 0.05)},
+    inputs={"current": "i"},
+    parameters={"resistance": {"start": 0.02, "sd": 0.02, "unknown": True, "min": 0}},
+    next=lambda x, u, p, dt: {"charge": x.charge - dt * u.current / 3000},
+    outputs=lambda x, u, p: {"v": th.table(x.charge, knots, volts, method="linear") - p.resistance * u.current},
+    measurement={"v": 0.002},
+)
+battery = th.grey(th.Log(voltage, current, sample_time=1, input_names=["i"], output_name="v"), cell)
+assert abs(battery.parameters[0] - 0.05) < 4 * battery.standard_errors[0]

@@ -473,7 +473,7 @@ def test_errors_of_functions_name_these_and_their_lines() -> None:
         (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 1], [1]), "rate": 0}, ValueError, "2 knots, but 1 values"),
         (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 0], [1, 1]), "rate": 0}, ValueError, "they must rise, but 0 follows 0"),
         (lambda x, u, p, dt: {"level": th.table(x.rate, [0], [1]), "rate": 0}, ValueError, "at least two"),
-        (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 1], [1, 1], method="x"), "rate": 0}, ValueError, "one of monotone"),
+        (lambda x, u, p, dt: {"level": th.table(x.rate, [0, 1], [1, 1], method="x"), "rate": 0}, ValueError, "one of monotone"),  # type: ignore[arg-type]
         (lambda x, u, p, dt: {"level": np.interp(x.rate, [0, 1], [1, x.level]), "rate": 0}, ValueError, "in next\\['level'\\], lines.*of states"),
         (lambda x, u, p, dt: {"level": np.interp(x.rate, [0, 1], [1, 2], period=3), "rate": 0}, TypeError, "period"),
         (lambda x, u, p, dt: {"level": th.where(x.rate, 1, 2), "rate": 0}, TypeError, "expected a comparison"),

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from numbers import Real
 from types import CodeType, TracebackType
-from typing import Any, Union
+from typing import Any, Literal, Union
 
 import numpy as np
 
@@ -168,7 +168,7 @@ def where(condition: Any, a: Any, b: Any, *, width: Any = None) -> Expression:
     return Expression(condition.chosen(yes, no, "" if width is None else f" within {text_of(width)}"))
 
 
-def table(x: Any, knots: Iterable[Any], values: Iterable[Any], *, method: str = "monotone") -> Expression:
+def table(x: Any, knots: Iterable[Any], values: Iterable[Any], *, method: Literal["monotone", "linear"] = "monotone") -> Expression:
     """A look-up table of an expression, in the functions of a model in equations.
 
     Parameters

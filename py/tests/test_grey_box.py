@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -256,8 +257,10 @@ def test_further_starts_find_the_lower_optimum() -> None:
         substeps=5,
     )
     with pytest.warns(th.EstimationWarning):
-        alone = th.grey(log, box)
+        alone = th.grey(log, box, starts=0)
     best = th.grey(log, box, starts=20, seed=1)
+    # Where nothing is said, more are tried if the first one explains the log badly.
+    assert abs(th.grey(log, box).parameters[0] - 9.8) < 0.1
     assert abs(best.parameters[0] - 9.8) < 0.1 < abs(alone.parameters[0] - 9.8)
     assert best.log_likelihood > alone.log_likelihood
     assert best.to_json() == th.grey(log, box, starts=20, seed=1).to_json()
@@ -492,3 +495,79 @@ def test_errors_of_functions_name_these_and_their_lines() -> None:
     by_class = type("Plant", (), {"__call__": lambda self, x, u, p: {"y": x.lvl}})()
     with pytest.raises(AttributeError, match="outputs, which is 'Plant' of test_grey_box.py"):
         made(outputs=by_class)
+
+
+def swinging(rng: np.random.Generator) -> tuple[th.Log, Callable[[Sequence[float]], th.GreyBox], tuple[float, ...]]:
+    """A pendulum that is driven, its length and its damping."""
+    dt, length, damping = 0.02, 0.7, 0.3
+    u, x, y = np.repeat(rng.uniform(-3, 3, 30), 20), np.array([0.5, 0.0]), np.zeros(600)
+    for k in range(600):
+        y[k] = x[0] + 0.005 * rng.standard_normal()
+        for _ in range(100):
+            x = x + dt / 100 * np.array([x[1], -9.81 / length * np.sin(x[0]) - damping * x[1] + u[k]])
+
+    def model(factors: Sequence[float]) -> th.GreyBox:
+        return th.GreyBox.from_functions(
+            sample_time=dt,
+            states={"angle": (0, 1), "rate": (0, 1)},
+            inputs={"torque": "u"},
+            parameters=started({"length": length, "damping": damping}, factors),
+            derivative=lambda x, u, p: {"angle": x.rate, "rate": -9.81 / p.length * np.sin(x.angle) - p.damping * x.rate + u.torque},
+            outputs=lambda x, u, p: {"y": x.angle},
+            measurement={"y": 0.005},
+            process={"rate": 1e-4},
+        )
+
+    return th.Log(y, u, sample_time=dt), model, (length, damping)
+
+
+def rubbing(rng: np.random.Generator) -> tuple[th.Log, Callable[[Sequence[float]], th.GreyBox], tuple[float, ...]]:
+    """A motor with friction: its gain, its time constant, and the friction."""
+    dt, gain, lag, friction = 0.01, 10.0, 0.15, 8.0
+    u, speed, y = np.repeat(rng.uniform(-6, 6, 40), 25), 0.0, np.zeros(1000)
+    for k in range(1000):
+        y[k] = speed + 0.2 * rng.standard_normal()
+        for _ in range(20):
+            speed += dt / 20 * (gain * u[k] - speed - friction * np.tanh(speed)) / lag
+
+    def model(factors: Sequence[float]) -> th.GreyBox:
+        return th.GreyBox.from_functions(
+            sample_time=dt,
+            states={"speed": (0, 1)},
+            inputs={"voltage": "u"},
+            parameters=started({"gain": gain, "lag": lag, "friction": friction}, factors),
+            derivative=lambda x, u, p: {"speed": (p.gain * u.voltage - x.speed - p.friction * np.tanh(x.speed)) / p.lag},
+            outputs=lambda x, u, p: {"y": x.speed},
+            measurement={"y": 0.2},
+            process={"speed": 0.05},
+        )
+
+    return th.Log(y, u, sample_time=dt), model, (gain, lag, friction)
+
+
+def started(truth: dict[str, float], factors: Sequence[float]) -> dict[str, Any]:
+    starts = {name: value * factor for (name, value), factor in zip(truth.items(), factors)}
+    return {name: {"start": start, "sd": start, "unknown": True, "min": 0} for name, start in starts.items()}
+
+
+@pytest.mark.filterwarnings("ignore::thetahat.EstimationWarning")
+@pytest.mark.parametrize(
+    ("plant", "seed", "factors"),
+    [
+        # The search from these ends far below the largest likelihood, or cannot begin.
+        (swinging, 7, (10, 10)),
+        (swinging, 16, (10, 0.1)),
+        (rubbing, 0, (0.1, 0.1, 10)),
+        (rubbing, 12, (0.1, 0.1, 10)),
+        (rubbing, 14, (10, 0.1, 0.1)),
+        # From these it does not.
+        (swinging, 1, (0.1, 0.1)),
+        (rubbing, 1, (0.1, 10, 10)),
+    ],
+)
+def test_starts_ten_times_off_find_the_plant(plant: Any, seed: int, factors: Sequence[float]) -> None:
+    log, model, truth = plant(np.random.default_rng(seed))
+    found = th.grey(log, model(factors))
+    known = th.grey(log, model([1.0] * len(truth)))
+    np.testing.assert_allclose(found.parameters, known.parameters, rtol=1e-3)
+    np.testing.assert_allclose(found.parameters, truth, rtol=0.05)

@@ -349,7 +349,9 @@ fn common(options: &FitOptions) -> Result<Common, Error> {
 
 fn equations(options: &FitOptions) -> Result<EquationsPlan, Error> {
     let Common { estimate, validate, split, .. } = common(options)?;
-    Ok(EquationsPlan { estimate, validate, split, search: search::search(options)? })
+    // Where no number is given there are more if they are needed.
+    let own_start_only = options.starts == Some(0);
+    Ok(EquationsPlan { estimate, validate, split, search: search::search(options)?, own_start_only })
 }
 
 impl Draft for EquationsPlan {

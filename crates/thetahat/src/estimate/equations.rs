@@ -95,6 +95,15 @@ pub struct LikelihoodSearch {
     pub reached: Vec<Option<f64>>,
 }
 
+/// Where a model's own start leads to no maximum: how many further points are drawn, from how many of them searches
+/// begin, and within what factor of the model's own they lie, either way.
+const DRAWN: usize = 60;
+const FURTHER: usize = 6;
+const FACTOR: f64 = 30.0;
+/// Errors that are four times as large as the noises of the model say may be those of a maximum far below the
+/// largest.
+const HOPELESS: f64 = 16.0;
+
 /// What was found.
 #[derive(Debug, Clone)]
 pub(crate) struct EquationsEstimate {
@@ -118,23 +127,76 @@ pub(crate) struct EquationsEstimate {
 /// the model knows of them, N(z, sd). What reaches the largest likelihood wins, the first of them where several do. All
 /// of them are searched side by side; the result does not depend on how many threads there are.
 ///
+/// Where no further ones are asked for or, with `own_start_only`, ruled out, and the model's own start leads to no
+/// maximum, because the filter does not work there, the log does not tell the parameters apart where it ends, no step
+/// raises the likelihood, or errors are far larger than the noises, further points are drawn over a wide range, and
+/// searches begin at the best of them.
+///
 /// # Errors
 /// As for [`fit_equations`](crate::report::fit_equations).
 pub(crate) fn largest_likelihood(
     model: &GreyBox,
     experiments: &[Experiment],
     options: &Search,
+    own_start_only: bool,
     monitor: Monitor<'_>,
 ) -> Result<EquationsEstimate, Error> {
     let criterion = || LikelihoodObjective::new(model, experiments);
     let starts = checked_starts(model, &criterion(), options)?;
     let deadline = Deadline::after(options.time_limit);
-    let searched = starts.into_par_iter().map(|start| {
-        let mut deviance = Deviance::new(model, criterion());
-        // No likelihood is so large that it cannot be larger.
-        search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
-    });
-    estimate_of(model, experiments, options, searched.collect(), &mut criterion())
+    let from = |starts: Vec<Vec<f64>>| -> Result<Vec<Result<Found, Failure>>, Error> {
+        let searched = starts.into_par_iter().map(|start| {
+            let mut deviance = Deviance::new(model, criterion());
+            // No likelihood is so large that it cannot be larger.
+            search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
+        });
+        searched.collect()
+    };
+    let mut searched = from(starts)?;
+    let explains =
+        |ended: &LikelihoodObjective<'_>| ended.slopes().squares <= HOPELESS * ended.measurements() as f64;
+    let mut ended = criterion();
+    let own = estimate_of(model, experiments, options, searched.clone(), &mut ended);
+    let is_a_maximum = own.as_ref().is_ok_and(|own| own.search.stopped != Stopped::NoDescent);
+    if own_start_only || options.starts > 0 || (is_a_maximum && explains(&ended)) || deadline.is_over() {
+        return own;
+    }
+    let further = further_starts(model.parameters(), options.seed, criterion);
+    let options = Search { starts: further.len(), ..options.clone() };
+    searched.extend(from(further)?);
+    let best = estimate_of(model, experiments, &options, searched, &mut ended);
+    // Where nothing explains the log, what is to be said is of the model's own start.
+    if best.is_ok() && (own.is_ok() || explains(&ended)) { best } else { own }
+}
+
+/// The points with the largest likelihood of many that lie far around the start of the model: the distances to a bound,
+/// or from zero, are spread evenly on a logarithmic scale.
+fn further_starts<L: Likelihood>(
+    unknown: &[Unknown],
+    seed: u64,
+    criterion: impl Fn() -> L + Sync,
+) -> Vec<Vec<f64>> {
+    let mut random = Rand64::new(u128::from(seed));
+    let mut drawn = || -> Vec<f64> {
+        let far = |unknown: &Unknown| {
+            let (z, deviation) = unknown.start_variable();
+            let spread = FACTOR.ln() * (2.0 * random.rand_float() - 1.0);
+            match unknown.scale {
+                Scale::Free if unknown.start == 0.0 => z + deviation * spread,
+                Scale::Free => z * spread.exp(),
+                // The variables of bounds are logarithms.
+                _ => z + spread,
+            }
+        };
+        unknown.iter().map(far).collect()
+    };
+    let points: Vec<Vec<f64>> = (0..DRAWN).map(|_| drawn()).collect();
+    let values = points.par_iter().map(|point| criterion().evaluate(point).ok().filter(|v| v.is_finite()));
+    let values: Vec<Option<f64>> = values.collect();
+    let mut known: Vec<(f64, Vec<f64>)> =
+        values.into_iter().zip(points).filter_map(|(value, point)| Some((value?, point))).collect();
+    known.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+    known.into_iter().take(FURTHER).map(|(_, point)| point).collect()
 }
 
 /// The same with a likelihood that others compute, from one start after the other.
@@ -151,7 +213,7 @@ pub(crate) fn largest_likelihood_of(
     let searched = starts
         .iter()
         .map(|start| search(&mut deviance, start, options, f64::NEG_INFINITY, deadline, monitor));
-    let searched = searched.collect();
+    let searched = searched.collect::<Result<_, Error>>()?;
     estimate_of(model, experiments, options, searched, &mut deviance.criterion)
 }
 
@@ -180,12 +242,11 @@ fn estimate_of(
     model: &GreyBox,
     experiments: &[Experiment],
     options: &Search,
-    searched: Vec<Result<Result<Found, Failure>, Error>>,
+    searched: Vec<Result<Found, Failure>>,
     criterion: &mut impl Likelihood,
 ) -> Result<EquationsEstimate, Error> {
     let unknown = model.parameters();
     let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
-    let searched: Vec<Result<Found, Failure>> = searched.into_iter().collect::<Result<_, Error>>()?;
     let log_likelihood = |cost: f64| -cost / 2.0;
     let reached: Vec<Option<f64>> =
         searched.iter().map(|found| found.as_ref().ok().map(|found| log_likelihood(found.cost()))).collect();

@@ -40,6 +40,8 @@ pub struct EquationsPlan {
     pub split: Option<Split>,
     /// How to search; `initial_parameters` and `plant_first` do not apply.
     pub search: Search,
+    /// Whether searches from the start of the model alone are left at that, where it leads to no maximum.
+    pub own_start_only: bool,
 }
 
 /// Finds the unknown parameters of a model in equations in a log, or in several that are joined, and reports on it.
@@ -56,7 +58,8 @@ pub struct EquationsPlan {
 /// parameter the fit uses `start`, where the search begins, and its bounds; `walk` is for a filter that estimates it
 /// with the state. A search finds the minimum that its start leads to. Further starts, as many as `search.starts` says,
 /// are drawn from what the model knows of the parameters, start and `sd` after the change of variable; the largest
-/// likelihood that is reached wins.
+/// likelihood that is reached wins. Where none are asked for and the search leads to no maximum that explains the log,
+/// some are drawn over three decades, unless `own_start_only` says otherwise.
 ///
 /// **Rows.** The state of the first row that is estimated on is the model's start, in each log. Rows of it that are not
 /// asked for but stand after go through the filter and do not count; so is the model evaluated on other rows of these
@@ -132,7 +135,7 @@ pub fn fit_equations(
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
     fit(model, log, sources, plan, |experiments| {
-        largest_likelihood(model, experiments, &plan.search, monitor)
+        largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor)
     })
 }
 

@@ -64,7 +64,8 @@ class FitOptions(TypedDict, total=False):
     step
         Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     starts
-        Search from this many further starts [default: 0, with ``narx`` 4]
+        Search from this many further starts [default: 0, with ``narx`` 4, with ``grey`` some where the first
+        one fails]
     seed
         The seed of random starts and of random centres [default: 0]
     time_limit
@@ -352,7 +353,8 @@ class ProcessOptions(TypedDict, total=False):
     step
         Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     starts
-        Search from this many further starts [default: 0, with ``narx`` 4]
+        Search from this many further starts [default: 0, with ``narx`` 4, with ``grey`` some where the first
+        one fails]
     time_limit
         After this time begin no iteration and no search from a further start
     """
@@ -445,7 +447,8 @@ class NarxOptions(TypedDict, total=False):
     step
         Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     starts
-        Search from this many further starts [default: 0, with ``narx`` 4]
+        Search from this many further starts [default: 0, with ``narx`` 4, with ``grey`` some where the first
+        one fails]
     seed
         The seed of random starts and of random centres [default: 0]
     time_limit
@@ -507,7 +510,8 @@ class EquationsOptions(TypedDict, total=False):
     step
         Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
     starts
-        Search from this many further starts [default: 0, with ``narx`` 4]
+        Search from this many further starts [default: 0, with ``narx`` 4, with ``grey`` some where the first
+        one fails]
     seed
         The seed of random starts and of random centres [default: 0]
     time_limit

@@ -158,7 +158,15 @@ fn refusals_say_what_to_do() {
     says(fitted(&model, infinite), "infinite in row 5");
     // With this gain the level leaves the range of numbers in a few rows.
     let wild = tank(&format!("gain = 1\nscale = 1\naside = 0\nloss = {{ start = 1e80, {UNKNOWN} }}"));
+    let own_start_only = EquationsPlan { own_start_only: true, ..EquationsPlan::default() };
+    let alone = fit_equations(&wild, &joined(&[log(0.1)]).unwrap(), &[], &own_start_only, &|_| {
+        ControlFlow::Continue(())
+    });
+    assert_refused(alone, "the filter leaves the range of numbers in row");
+    // Around it there is no better one.
     says(fitted(&wild, log(0.1)), "the filter leaves the range of numbers in row");
+    let far = tank(&format!("gain = 1\nscale = 1\naside = 0\nloss = {{ start = 2, {UNKNOWN} }}"));
+    assert!((fitted(&far, log(0.1)).unwrap().parameter(0).0 - 0.1).abs() < 0.05);
 }
 
 #[test]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
@@ -38,6 +38,36 @@ def predicted(filter: _thetahat.StateFilter, inputs: int, u: Any, steps: int | N
     return found[:, 0] if found.shape[1] == 1 else found
 
 
-def free_run(model: _thetahat.StateModel, u: Any, steps: int | None) -> Array:
-    """The outputs from the initial state on, without noise."""
-    return predicted(_thetahat.StateFilter(model, None, None, None), len(model.inputs), u, steps)
+class Simulates:
+    """A model that a filter reads, which runs without one too."""
+
+    __slots__ = ()
+
+    def _filtered(self) -> _thetahat.StateModel:
+        """The model as a filter reads it."""
+        raise NotImplementedError
+
+    def simulate(self, u: ArrayLike | None = None, steps: int | None = None) -> Array:
+        """The free run from the initial state, without noise, unknown parameters at their starts: the outputs that inputs drive, or so many
+        steps without inputs.
+
+        Parameters
+        ----------
+        u : array_like, shape (N,) or (N, inputs), optional
+            The inputs, one sample time apart.
+        steps : int, optional
+            How many, of a model without inputs.
+
+        Returns
+        -------
+        ndarray, shape (N,), or (N, outputs) where there are several
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> model = th.StateModel([[0.9]], [[1.0]], [[1.0]], [[1.0]], [[1.0]], G=[[1.0]], sample_time=0.1)
+        >>> model.simulate([1.0, 1.0, 1.0])
+        array([0. , 1. , 1.9])
+        """
+        model = self._filtered()
+        return predicted(_thetahat.StateFilter(model, None, None, None), len(model.inputs), u, steps)

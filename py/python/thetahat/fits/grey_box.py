@@ -10,12 +10,12 @@ from numbers import Real
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
-from thetahat.engine import files as _files, options as _options, runs as _runs
+from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import EquationsOptions
+from thetahat.engine.runs import Simulates
 from thetahat.fits.expressions import Expression, Names, Written
 from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
@@ -30,7 +30,7 @@ def _number(name: str, value: Any) -> float:
     return float(value)
 
 
-class GreyBox:
+class GreyBox(Simulates):
     """A model of a plant in equations, of which some parameters may be unknown, as ``thetahat fit --grey`` reads it.
 
     Parameters
@@ -204,35 +204,8 @@ class GreyBox:
         made._model = self._model.with_parameters([(name, _number(name, value)) for name, value in values.items()])
         return made
 
-    def simulate(self, u: ArrayLike | None = None, steps: int | None = None) -> NDArray[np.float64]:
-        """The free run from the initial state, without noise, unknown parameters at their starts: the outputs that inputs drive, or so many steps without inputs.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,) or (N, inputs), optional
-            The inputs, one sample time apart.
-        steps : int, optional
-            How many, of a model without inputs.
-
-        Returns
-        -------
-        ndarray, shape (N,), or (N, outputs) where there are several
-
-        Examples
-        --------
-        >>> import thetahat as th
-        >>> box = th.GreyBox({
-        ...     "sample_time": 1,
-        ...     "states": {"level": {"start": 0, "sd": 1}},
-        ...     "inputs": {"flow": "u"},
-        ...     "next": {"level": "0.9 * level + flow"},
-        ...     "outputs": {"y": "level"},
-        ...     "noise": {"measurement": {"y": 1}},
-        ... })
-        >>> box.simulate([1.0, 1.0, 1.0])
-        array([0. , 1. , 1.9])
-        """
-        return _runs.free_run(_thetahat.StateModel.from_grey_box(self._model), u, steps)
+    def _filtered(self) -> _thetahat.StateModel:
+        return _thetahat.StateModel.from_grey_box(self._model)
 
     def to_toml(self) -> str:
         """The text as it was written."""

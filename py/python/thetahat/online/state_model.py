@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
-from thetahat.engine import files as _files, options as _options, runs as _runs
+from thetahat.engine import files as _files, options as _options
+from thetahat.engine.runs import Simulates
 from thetahat.engine.values import Duration
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
-class StateModel:
+class StateModel(Simulates):
     """A linear model in matrices with its noises, for a `StateFilter`.
 
     ::
@@ -185,28 +186,8 @@ class StateModel:
         """Seconds of a sample."""
         return self._model.sample_time
 
-    def simulate(self, u: npt.ArrayLike | None = None, steps: int | None = None) -> npt.NDArray[np.float64]:
-        """The free run from the initial state, without noise: the outputs that inputs drive, or so many steps without inputs.
-
-        Parameters
-        ----------
-        u : array_like, shape (N,) or (N, inputs), optional
-            The inputs, one sample time apart.
-        steps : int, optional
-            How many, of a model without inputs.
-
-        Returns
-        -------
-        ndarray, shape (N,), or (N, outputs) where there are several
-
-        Examples
-        --------
-        >>> import thetahat as th
-        >>> model = th.StateModel([[0.9]], [[1.0]], [[1.0]], [[1.0]], [[1.0]], G=[[1.0]], sample_time=0.1)
-        >>> model.simulate([1.0, 1.0, 1.0])
-        array([0. , 1. , 1.9])
-        """
-        return _runs.free_run(self._model, u, steps)
+    def _filtered(self) -> _thetahat.StateModel:
+        return self._model
 
     def __eq__(self, other: object) -> bool:
         return self._text == other._text if isinstance(other, StateModel) else NotImplemented

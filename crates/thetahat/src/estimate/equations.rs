@@ -64,6 +64,9 @@ pub struct UnknownParameter {
     /// The standard error of the estimate if the noises of the model are those of the log: not multiplied by the
     /// covariance factor.
     pub nominal_standard_error: f64,
+    /// Its unit, if the model tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
 }
 
 /// How the search for the largest likelihood went.
@@ -325,6 +328,7 @@ impl Unknown {
             max,
             change_of_variable: self.change_of_variable(),
             nominal_standard_error,
+            unit: self.unit.clone(),
         }
     }
 }

@@ -5,6 +5,7 @@ mod channels;
 mod document;
 mod dynamics;
 mod expression;
+mod figures;
 mod fitted;
 mod graph;
 mod interpolation;
@@ -19,6 +20,8 @@ pub(crate) mod tests;
 pub(crate) use channels::{ChannelExpression, ExpressionBuffer};
 pub(crate) use document::{Document, Entry, Section, suggestion};
 use dynamics::{Functions, Step};
+pub use figures::DerivedFigure;
+use figures::Figures;
 pub use fitted::EquationsModel;
 pub(crate) use graph::{Function, Operation};
 pub(crate) use program::Program;
@@ -93,6 +96,10 @@ use crate::Error;
 /// min)/(1 + exp(-z)), with z free. `walk` is the standard deviation by which such a parameter drifts each
 /// `sample_time`.
 ///
+/// **Figures.** `[figures]` has expressions of parameters, and of figures above, which a fit reports with their standard
+/// errors: `time_constant = "capacity / loss"`, or with a unit `{ value = "capacity / loss", unit = "s" }`. Those whose
+/// names begin with `_` only serve others. A parameter may have a `unit` too.
+///
 /// All equations are compiled once into one list of operations in which nothing is computed twice, together with all
 /// partial derivatives, found by the rules of calculus. Nothing is approximated by differences.
 ///
@@ -144,6 +151,7 @@ pub struct GreyBox {
     observation: Functions,
     process_variances: Vec<f64>,
     measurement_variances: Vec<f64>,
+    figures: Figures,
 }
 
 /// A parameter that is to be found.
@@ -155,6 +163,7 @@ pub(crate) struct Unknown {
     pub(crate) start: f64,
     pub(crate) deviation: f64,
     pub(crate) walk: f64,
+    pub(crate) unit: Option<String>,
 }
 
 /// The most equal steps that one step is divided into.

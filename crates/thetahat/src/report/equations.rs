@@ -44,6 +44,16 @@ pub struct EquationsPlan {
     pub own_start_only: bool,
 }
 
+impl EquationsPlan {
+    /// The rows of a log of so many that a fit is to.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for rows that are not there.
+    pub fn fitted_rows(&self, rows: usize) -> Result<Vec<Rows>, Error> {
+        Ok(Shares::of(&self.estimate, &self.validate, self.split, rows)?.estimation)
+    }
+}
+
 /// Finds the unknown parameters of a model in equations in a log, or in several that are joined, and reports on it.
 ///
 /// The predictor is the extended Kalman filter with the noises of the model. With its innovations e and their variances

@@ -115,6 +115,11 @@ impl<'d> Section<'d> {
         self.get(key).map(|entry| entry.section()).transpose()
     }
 
+    /// A text, if it is there.
+    pub(crate) fn text(&self, key: &str) -> Result<Option<&'d str>, Error> {
+        self.get(key).map(|entry| entry.text()).transpose()
+    }
+
     /// A number, if it is there.
     pub(crate) fn number(&self, key: &str) -> Result<Option<f64>, Error> {
         self.get(key).map(|entry| entry.number()).transpose()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::GreyBox;
+use super::{DerivedFigure, GreyBox};
 use crate::Error;
 use crate::model::{Parameter, Signal};
 
@@ -33,6 +33,9 @@ pub struct EquationsModel {
     /// Those of its unknown parameters that were given values before the fit.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub known: BTreeMap<String, f64>,
+    /// The figures that the model asks for, in the order of the text.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<DerivedFigure>,
 }
 
 impl EquationsModel {
@@ -41,6 +44,8 @@ impl EquationsModel {
         let signals = |names: &[String]| -> Vec<Signal> {
             names.iter().map(|name| Signal { name: name.clone(), ..Signal::default() }).collect()
         };
+        let z: Vec<f64> =
+            model.unknown.iter().zip(values).map(|(unknown, &value)| unknown.scale.variable(value)).collect();
         let parameters = model.unknown().zip(values).enumerate().map(|(index, (name, &value))| Parameter {
             name: name.to_owned(),
             value,
@@ -53,6 +58,7 @@ impl EquationsModel {
             outputs: signals(model.outputs()),
             sample_time: model.sample_time(),
             parameters: parameters.collect(),
+            figures: model.figures(&z, &covariance),
             covariance: Some(covariance),
             noise_covariance: (0..variances.len()).map(row).collect(),
             states: model.states().to_vec(),

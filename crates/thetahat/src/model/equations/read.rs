@@ -5,7 +5,7 @@ use super::dynamics::{Functions, Step};
 use super::expression::{self, CONSTANTS, Names};
 use super::graph::{Graph, Node, Operation};
 use super::program::Program;
-use super::{GreyBox, Scale, Unknown};
+use super::{Figures, GreyBox, Scale, Unknown};
 use crate::Error;
 
 /// Most substeps of a step.
@@ -27,6 +27,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         "derivative",
         "outputs",
         "noise",
+        "figures",
     ])?;
     let sample_time = root.require("sample_time", "the seconds of a sample")?.positive()?;
     let needed = |key: &str, what: &str| root.require(key, what)?.section();
@@ -54,6 +55,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         scope.declare(entry.key, node, entry)?;
     }
     let mut unknown = Vec::new();
+    let first_parameter = scope.names.len();
     for (entry, parameter) in parameters {
         let node = match parameter {
             Given::Known(value) => graph.constant(value),
@@ -113,6 +115,8 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         slopes.extend(graph.derivatives(&all, Operation::Input(input)));
     }
     let superposes = !graph.depends(&slopes, moves) && !graph.jumps(&all, moves);
+    let known_names = &scope.names[first_parameter..];
+    let figures = Figures::read(root.section("figures")?, known_names, unknown.len(), &mut graph)?;
     let any_step = step != Step::Next || graph.depends(&rates, |operation| operation == Operation::Step);
     Ok(GreyBox {
         text: text.to_owned(),
@@ -132,6 +136,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         observation,
         process_variances,
         measurement_variances,
+        figures,
     })
 }
 
@@ -179,22 +184,27 @@ impl<'d> Scope<'d> {
         Ok(())
     }
 
-    /// The expression of an entry: a text, or a mere number.
+    /// The expression of an entry.
     fn read(&self, entry: &Entry<'_>, graph: &mut Graph) -> Result<Node, Error> {
-        if !entry.is_text() {
-            return Ok(graph.constant(entry.number()?));
+        expression_of(entry, graph, self)
+    }
+}
+
+/// The expression of an entry: a text, or a mere number.
+pub(super) fn expression_of(entry: &Entry<'_>, graph: &mut Graph, names: &impl Names) -> Result<Node, Error> {
+    if !entry.is_text() {
+        return Ok(graph.constant(entry.number()?));
+    }
+    let (origin, exact) = entry.text_origin();
+    let node = expression::read(entry.text()?, graph, names).map_err(|fault| {
+        let offset = if exact { origin + fault.offset } else { origin };
+        error_at(entry.document(), offset, fault.message)
+    })?;
+    match graph.known(node) {
+        Some(value) if !value.is_finite() => {
+            Err(entry.value_error("this expression is not a finite number, whatever the states are"))
         }
-        let (origin, exact) = entry.text_origin();
-        let node = expression::read(entry.text()?, graph, self).map_err(|fault| {
-            let offset = if exact { origin + fault.offset } else { origin };
-            error_at(entry.document(), offset, fault.message)
-        })?;
-        match graph.known(node) {
-            Some(value) if !value.is_finite() => {
-                Err(entry.value_error("this expression is not a finite number, whatever the states are"))
-            }
-            _ => Ok(node),
-        }
+        _ => Ok(node),
     }
 }
 
@@ -218,7 +228,7 @@ impl Names for Scope<'_> {
 }
 
 /// That a name can stand in an expression.
-fn check_name(name: &str, entry: &Entry<'_>) -> Result<(), Error> {
+pub(super) fn check_name(name: &str, entry: &Entry<'_>) -> Result<(), Error> {
     if expression::is_reserved(name) || name == "log" {
         return Err(entry.error(format!("{} has a meaning in expressions: take another name", quoted(name))));
     }
@@ -279,7 +289,7 @@ fn parameter(entry: &Entry<'_>, known: &[(String, f64)]) -> Result<Given, Error>
         return Ok(Given::Known(entry.number()?));
     }
     let section = entry.section()?;
-    section.allow(&["start", "sd", "unknown", "min", "max", "walk"])?;
+    section.allow(&["start", "sd", "unknown", "min", "max", "walk", "unit"])?;
     let start = section.require("start", "the value that the parameter starts from")?;
     let value = start.number()?;
     let (min, max) = (section.number("min")?, section.number("max")?);
@@ -323,7 +333,8 @@ fn parameter(entry: &Entry<'_>, known: &[(String, f64)]) -> Result<Given, Error>
         ))
     })?;
     let name = entry.key.to_owned();
-    Ok(Given::Unknown(Unknown { name, scale, start: value, deviation, walk: walk.unwrap_or(0.0) }))
+    let unit = section.text("unit")?.map(str::to_owned);
+    Ok(Given::Unknown(Unknown { name, scale, start: value, deviation, walk: walk.unwrap_or(0.0), unit }))
 }
 
 /// How the states move on, and the table that says it.

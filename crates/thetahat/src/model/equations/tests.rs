@@ -1,5 +1,6 @@
 mod derivatives;
 mod expressions;
+mod figures;
 mod linear;
 mod models;
 mod refusals;

@@ -4,7 +4,7 @@ use super::procedure::procedure;
 use super::{closing, mean_square, responses};
 use crate::estimate::EquationsOutcome;
 use crate::figures::{number, scientific, seconds, short, three};
-use crate::model::{EquationsModel, Signal};
+use crate::model::{DerivedFigure, EquationsModel, Signal};
 use crate::present::filtered::consistency;
 use crate::present::tree::{Sections, Table, columns, error, figure, word};
 use crate::present::words::{criteria, or_dash};
@@ -25,6 +25,9 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &EquationsModel
     on.gap();
     let Some(outcome) = report.estimation.procedure.equations() else { return };
     on.table(parameters(outcome, model));
+    if !model.figures.is_empty() {
+        on.table(derived(&model.figures));
+    }
     if on.is_page() {
         on.table(starts(outcome, model));
     }
@@ -56,17 +59,39 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &EquationsModel
 
 /// The parameters, and what was known of them before.
 fn parameters(outcome: &EquationsOutcome, model: &EquationsModel) -> Table {
-    let head = ["parameter", "value", "standard error", "start", "min", "max", "estimated as"];
-    let mut table = columns("Parameters", head).words(&[6]).on_pages(&[4, 5]);
+    let head = ["parameter", "value", "standard error", "unit", "start", "min", "max", "estimated as"];
+    let mut table = columns("Parameters", head).words(&[3, 7]).on_pages(&[5, 6]);
+    if outcome.unknown.iter().all(|known| known.unit.is_none()) {
+        table = table.without(&[3]);
+    }
     for (parameter, known) in model.parameters.iter().zip(&outcome.unknown) {
         table.row([
             word(&parameter.name),
             figure(parameter.value, number),
             error(parameter.standard_error),
+            word(harmless(known.unit.as_deref().unwrap_or_default())),
             figure(known.start, short),
             figure(known.min, short),
             figure(known.max, short),
             word(known.change_of_variable.clone().unwrap_or_default()),
+        ]);
+    }
+    table
+}
+
+/// The figures that follow from the parameters.
+fn derived(figures: &[DerivedFigure]) -> Table {
+    let mut table = columns("Figures", ["figure", "value", "standard error", "unit"]).words(&[3]);
+    table = table.none("not a number with these parameters");
+    if figures.iter().all(|derived| derived.unit.is_none()) {
+        table = table.without(&[3]);
+    }
+    for derived in figures {
+        table.row([
+            word(&derived.name),
+            figure(derived.value, number),
+            error(derived.standard_error),
+            word(harmless(derived.unit.as_deref().unwrap_or_default())),
         ]);
     }
     table

@@ -16,6 +16,8 @@ use crate::validate::Test;
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Parameters whose correlation is beyond this one can hardly be told apart.
 const ALIKE: f64 = 0.99;
+/// So many pairs of them are named.
+const MOST_ALIKE: usize = 3;
 /// Innovations are called coloured below this p-value.
 const COLOURED: f64 = 0.01;
 
@@ -58,18 +60,29 @@ pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &
             }
         }
     }
+    let mut alike = Vec::new();
     for (i, row) in model.covariance.iter().flatten().enumerate() {
         for (j, covariance) in row.iter().enumerate().take(i) {
             let correlation = covariance / (deviation(i) * deviation(j));
             if correlation.abs() > ALIKE {
-                let names = [j, i].map(|index| model.parameters[index].name.clone());
-                warnings.push(format!(
-                    "the log can hardly tell {} apart (correlation {}): take one of them as known, or measure more",
-                    listed(&names),
-                    fixed(correlation, 4)
-                ));
+                alike.push((correlation, [j, i]));
             }
         }
+    }
+    alike.sort_by(|(one, _), (other, _)| other.abs().total_cmp(&one.abs()));
+    for (correlation, pair) in alike.iter().take(MOST_ALIKE) {
+        let names = pair.map(|index| model.parameters[index].name.clone());
+        warnings.push(format!(
+            "the log can hardly tell {} apart (correlation {}): take one of them as known, or measure more",
+            listed(&names),
+            fixed(*correlation, 4)
+        ));
+    }
+    if alike.len() > MOST_ALIKE {
+        let more = alike.len() - MOST_ALIKE;
+        warnings.push(format!(
+            "{more} more pairs of parameters have a correlation beyond {ALIKE}, see the covariance"
+        ));
     }
     if let Some(nis) = outcome.nis.filter(|nis| nis.relative() > *FITTING.end()) {
         warnings.push(format!(

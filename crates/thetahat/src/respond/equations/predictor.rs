@@ -24,6 +24,10 @@ use thetahat_core::Number;
 
 use crate::model::GreyBox;
 
+/// A variance that counts as none: without process noise, that of a state which forgets its start goes down until its
+/// square, by which derivatives are divided, is no number above 0 any more.
+const NEGLIGIBLE: f64 = 1e-140;
+
 /// The estimate of the state and its covariance, and the workspace of a step. Matrices are column after column.
 #[derive(Debug, Clone)]
 pub(crate) struct Predictor<S> {
@@ -143,7 +147,8 @@ impl<S: Number<f64>> Predictor<S> {
             for row in 0..index {
                 let other = &mut before[row * width..][..columns];
                 // Where nothing is uncertain, the column does not matter.
-                let entry = if pivot.value() > 0.0 { weighted(other, &self.weights) / pivot } else { zero };
+                let entry =
+                    if pivot.value() > NEGLIGIBLE { weighted(other, &self.weights) / pivot } else { zero };
                 self.factor[index * n + row] = entry;
                 other.iter_mut().zip(own).for_each(|(other, &own)| *other -= entry * own);
             }

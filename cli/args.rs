@@ -18,6 +18,7 @@ mod reduce;
 mod respond;
 mod spectrum;
 mod step;
+mod templates;
 mod track;
 mod tune;
 mod validate;
@@ -32,6 +33,7 @@ pub(crate) use convert::ConvertArguments;
 pub(crate) use design::DesignArguments;
 pub(crate) use each::EachArguments;
 pub(crate) use export::ExportArguments;
+pub(crate) use files::template_name;
 pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
 pub(crate) use fit::FitArguments;
 pub(crate) use inspect::InspectArguments;
@@ -45,6 +47,7 @@ pub(crate) use respond::{
 };
 pub(crate) use spectrum::{ResponseFormatArgument, SpectrumArguments};
 pub(crate) use step::StepArguments;
+pub(crate) use templates::{TemplateOptionArguments, TemplatesArguments};
 pub(crate) use track::{ResumeArgument, TrackArguments};
 pub(crate) use tune::{ControllerArgument, TuneArguments};
 pub(crate) use validate::{CompareArguments, EvaluationArguments, ValidateArguments};
@@ -89,6 +92,7 @@ Examples:
   thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
   thetahat fit --grey spring.toml log.csv --report spring.json
+  thetahat fit --grey template:battery log.csv --columns current=I,voltage=U --known capacity=33.4
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
@@ -322,6 +326,17 @@ Examples:
   thetahat design --for model.json --want 'dc-gain:2%,a1:0.01'
   thetahat design --for model.json --signal prbs,prbs:4,steps --length 500")]
     Design(Box<DesignArguments>),
+    /// Plants that are ready for fit --grey template:NAME: what each wants and finds
+    ///
+    /// Without a name it lists them; with one it prints the columns that it wants, with their units, the numbers that it
+    /// takes as known and the parameters that it finds. With logs it writes the model as a text (TOML), with start values
+    /// that are found from them: change it, and fit it with --grey.
+    #[command(after_help = "\
+Examples:
+  thetahat templates
+  thetahat templates battery
+  thetahat templates battery log.csv --columns current=I,voltage=U > cell.toml")]
+    Templates(Box<TemplatesArguments>),
     /// Fit a sample log of a DC motor, carried inside the program
     ///
     /// Writes the log and the report of its fit into a folder and prints the table.

@@ -22,6 +22,7 @@ mod search;
 mod spectrum;
 mod step;
 mod stored;
+mod templates;
 mod track;
 mod transient;
 mod tune;
@@ -60,6 +61,7 @@ pub(crate) fn dispatch(arguments: Arguments, line: &str) -> Result<(), Failure> 
         Command::Control(arguments) => control::control(&arguments),
         Command::Export(arguments) => export::export(&arguments),
         Command::Design(arguments) => design::design(&arguments),
+        Command::Templates(arguments) => templates::templates(&arguments),
         Command::Demo(arguments) => demo::demo(&arguments),
         Command::Schema { document } => help::schema(document),
         Command::Completions { shell } => help::completions(shell),

@@ -6,6 +6,7 @@ mod fit;
 mod inspect;
 mod spectrum;
 mod step;
+mod template;
 mod track;
 mod validate;
 
@@ -26,10 +27,11 @@ use crate::memory::PerValue;
 
 pub(crate) use control::control_plan;
 pub(crate) use filter::FilterJob;
-pub(crate) use fit::FitJob;
+pub(crate) use fit::{Equations, FitJob};
 pub(crate) use inspect::InspectJob;
 pub(crate) use spectrum::SpectrumJob;
 pub(crate) use step::StepTestJob;
+pub(crate) use template::{TemplateOptions, TemplatesJob};
 pub(crate) use track::TrackJob;
 pub(crate) use validate::EvaluationJob;
 

@@ -21,8 +21,9 @@ const TABLES: [&[OptionRow]; 6] = [
 ];
 
 /// The arguments of the libraries that are options, by the name that both have, beside those in a table.
-pub(crate) const OPTIONS: [&str; 37] = [
+pub(crate) const OPTIONS: [&str; 39] = [
     "cancel-zeros",
+    "columns",
     "comment",
     "decimal-comma",
     "delimiter",
@@ -35,6 +36,7 @@ pub(crate) const OPTIONS: [&str; 37] = [
     "grey",
     "header-row",
     "hold",
+    "known",
     "limits",
     "lqr",
     "measurement-noise",

@@ -56,7 +56,7 @@ const LIBRARY: House = House {
         &["estimate"],
         &["validate"],
         &["select"],
-        &["inspect", "spectrum"],
+        &["inspect", "spectrum", "templates"],
         &["control", "design", "plan", "step_test", "tune"],
         &["report"],
         &["filter", "fit", "track"],

@@ -5,6 +5,11 @@ use std::path::Path;
 use super::{Command, EvaluationArguments, PredictArguments, SimulateArguments};
 use crate::files::Files;
 
+/// The name of a template, if a model is one.
+pub(crate) fn template_name(model: &Path) -> Option<&str> {
+    model.to_str()?.strip_prefix("template:")
+}
+
 impl Command {
     /// The files that a verb reads and writes.
     pub(crate) fn files(&self) -> Files {
@@ -12,7 +17,8 @@ impl Command {
         let Files { read, written, makes_folders } = &mut files;
         match self {
             Self::Fit(fit) => {
-                let documents = fit.grey.iter().chain(&fit.plan).chain(&fit.from);
+                let grey = fit.grey.iter().filter(|path| template_name(path).is_none());
+                let documents = grey.chain(&fit.plan).chain(&fit.from);
                 read.extend(documents.chain(&fit.logs).cloned());
                 read.extend(fit.each.list.iter().cloned());
                 written.extend(fit.report.iter().chain(&fit.html).chain(&fit.each.table).cloned());
@@ -96,6 +102,7 @@ impl Command {
                 read.extend(design.model.clone());
                 written.extend([&design.out].into_iter().chain(&design.spectrum).cloned());
             }
+            Self::Templates(templates) => read.extend(templates.logs.iter().cloned()),
             Self::Demo(_) | Self::Schema { .. } | Self::Completions { .. } | Self::Man { .. } => {}
         }
         files

@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use thetahat::plan::FitOptions;
 
-use super::{ClockArguments, EachArguments, FormatArgument, LogArguments, OptionArguments};
+use super::{
+    ClockArguments, EachArguments, FormatArgument, LogArguments, OptionArguments, TemplateOptionArguments,
+};
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input)
-    #[arg(value_name = "LOG", required_unless_present_any = ["from", "list"])]
+    #[arg(value_name = "LOG", required_unless_present_any = ["from", "list", "grey"])]
     pub(crate) logs: Vec<PathBuf>,
     /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input);
     /// with --structure or --np
@@ -24,9 +26,12 @@ pub(crate) struct FitArguments {
     #[command(flatten)]
     pub(crate) options: OptionArguments<FitOptions>,
     /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by
-    /// name, the clock may be irregular
+    /// name, the clock may be irregular. template:NAME is a plant that is ready, with start values from the log: thetahat
+    /// templates lists them
     #[arg(long, value_name = "MODEL", help_heading = "Model", conflicts_with = "from")]
     pub(crate) grey: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) template: TemplateOptionArguments,
     /// Take the options from a plan in JSON, or from a report, whose fit is then repeated; options on the command line
     /// replace those of the plan
     #[arg(long, value_name = "FILE", help_heading = "Model")]

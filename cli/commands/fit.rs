@@ -13,10 +13,10 @@ use thetahat::report::{Report, Validated, ValidationPlan, held_out_runs, validat
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
 use super::search::{Identified, Telling};
-use super::{pieces, stored};
-use crate::args::{EachArguments, FitArguments, FormatArgument};
+use super::{pieces, stored, templates};
+use crate::args::{EachArguments, FitArguments, FormatArgument, template_name};
 use crate::failure::Failure;
-use crate::job::FitJob;
+use crate::job::{Equations, FitJob};
 use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
@@ -64,8 +64,8 @@ fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
         let report = report.map_err(log::failure(&response.logs))?;
         return Ok(Identified { report, log: None, sources: Vec::new() });
     }
-    if let Some(path) = &job.equations {
-        return equations(job, path, telling);
+    if let Some(from) = &job.equations {
+        return equations(job, from, telling);
     }
     let draft = job.draft()?;
     let Experiments { log, sources, channels, warnings } = experiments(job, draft.takes_any_clock())?;
@@ -80,14 +80,29 @@ fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
 }
 
 /// Reads the logs and fits the unknown parameters of a model in equations.
-fn equations(job: &FitJob, path: &Path, telling: &Telling) -> Result<Identified, Failure> {
-    let model = GreyBox::from_toml(&stored::text(path)?)
-        .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+fn equations(job: &FitJob, from: &Equations, telling: &Telling) -> Result<Identified, Failure> {
     let draft = job.draft()?;
-    let Joined { log, sources, warnings } =
-        log::joined(&job.paths, &job.log, Clocks::from(&model), |_, _| {
-            Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
-        })?;
+    let known: Vec<(&str, f64)> =
+        job.template.known.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    let (model, Joined { log, sources, warnings }) = match from {
+        Equations::File(path) => {
+            let model = GreyBox::from_toml(&stored::text(path)?)
+                .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+            let model = model
+                .with_parameters(&known)
+                .map_err(|error| Failure::usage(format!("--known: {}: {error}", path.display())))?;
+            let joined = log::joined(&job.paths, &job.log, Clocks::from(&model), |_, _| {
+                Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
+            })?;
+            (model, joined)
+        }
+        Equations::Template(template) => {
+            let plan = draft.equations_plan().map_err(|error| Failure::option(&error))?;
+            templates::of_logs(template, &job.paths, &job.log, &job.template, |log| {
+                plan.fitted_rows(log.rows())
+            })?
+        }
+    };
     warnings.iter().for_each(|warning| telling.warn(warning));
     let report = telling.watched(|monitor| draft.fit_equations(&model, &log, &sources, monitor))?;
     Ok(Identified { report: report.map_err(log::failure(&sources))?, log: Some(log), sources })
@@ -104,7 +119,9 @@ fn of_many(arguments: &FitArguments) -> Result<String, Failure> {
     // What is wrong with the options is so with all logs.
     resolved(&own)?;
     let text = |path: &Option<PathBuf>| path.as_deref().map(stored::text).transpose();
-    Ok(format!("fit {own:?} {:?} {:?}", text(&arguments.grey)?, text(&arguments.plan)?))
+    // A template is not in a file.
+    let grey = arguments.grey.clone().filter(|path| template_name(path).is_none());
+    Ok(format!("fit {own:?} {:?} {:?}", text(&grey)?, text(&arguments.plan)?))
 }
 
 /// Fits a model to one log of many.

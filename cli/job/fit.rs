@@ -3,11 +3,20 @@ use std::path::{Path, PathBuf};
 use thetahat::fit::FitDraft;
 use thetahat::options::Options;
 use thetahat::plan::{FitOptions, Fitted};
+use thetahat::templates::Template;
 
-use super::LogJob;
-use crate::args::FitArguments;
+use super::{LogJob, TemplateOptions};
+use crate::args::{FitArguments, template_name};
 use crate::failure::Failure;
 use crate::memory::PerValue;
+
+/// Where a model in equations comes from.
+#[derive(Debug)]
+pub(crate) enum Equations {
+    /// A file.
+    File(PathBuf),
+    Template(&'static Template),
+}
 
 /// A model to fit.
 #[derive(Debug)]
@@ -17,7 +26,9 @@ pub(crate) struct FitJob {
     /// How all of them are read.
     pub(crate) log: LogJob,
     /// A model in equations.
-    pub(crate) equations: Option<PathBuf>,
+    pub(crate) equations: Option<Equations>,
+    /// What is known of its parameters, and which column is which.
+    pub(crate) template: TemplateOptions,
     /// The document of a frequency response.
     pub(crate) response: Option<PathBuf>,
     /// Whether the logs are read part by part.
@@ -49,10 +60,43 @@ impl FitJob {
             let what = if arguments.grey.is_some() { "the model and the logs" } else { "the logs" };
             return Err(Failure::usage(format!("only one of {what} can come from standard input (-)")));
         }
+        let template = TemplateOptions::resolve(&arguments.template)?;
+        let equations = match arguments.grey.as_deref().map(|path| (path, template_name(path))) {
+            None => {
+                let given =
+                    [("--columns", template.columns.is_empty()), ("--known", template.known.is_empty())];
+                if let Some((option, _)) = given.iter().find(|(_, is_empty)| !is_empty) {
+                    return Err(Failure::usage(format!("{option} goes with --grey, a model in equations")));
+                }
+                None
+            }
+            Some((path, None)) => {
+                if !template.columns.is_empty() {
+                    let message = "--columns is for templates; a model in a text names its channels itself";
+                    return Err(Failure::usage(message));
+                }
+                Some(Equations::File(path.to_owned()))
+            }
+            Some((_, Some(name))) => {
+                let template = Template::named(name).map_err(|error| Failure::option(&error))?;
+                if arguments.logs.is_empty() {
+                    let summary = template.summary();
+                    return Err(Failure::usage(format!(
+                        "name the logs to fit {} to\n\n{summary}",
+                        template.name
+                    )));
+                }
+                Some(Equations::Template(template))
+            }
+        };
+        if arguments.logs.is_empty() && arguments.from.is_none() && arguments.each.list.is_none() {
+            return Err(Failure::usage("name the logs to fit the model to"));
+        }
         let mut job = Self {
             paths: arguments.logs.clone(),
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
-            equations: arguments.grey.clone(),
+            equations,
+            template,
             response: arguments.from.clone(),
             in_pieces: arguments.stream,
             keeps_log: arguments.html.is_some(),

@@ -1,6 +1,8 @@
 //! Simulates the logs of the models beside it, with the noises that they tell of. Write the logs anew with
 //! `cargo run --example simulated_logs`.
 
+mod simulated_templates;
+
 use std::fmt::Write;
 
 /// Uniform numbers in [0, 1): xorshift (Marsaglia 2003).
@@ -127,6 +129,9 @@ fn heater_steps() -> String {
 
 fn main() -> std::io::Result<()> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    for (name, log) in simulated_templates::logs() {
+        std::fs::write(folder.join("templates").join(format!("{name}.csv")), log)?;
+    }
     std::fs::write(folder.join("mass_spring_damper.csv"), mass_spring_damper())?;
     std::fs::write(folder.join("battery.csv"), battery())?;
     std::fs::write(folder.join("heater_steps.csv"), heater_steps())?;
@@ -139,4 +144,11 @@ fn the_logs_beside_this_program_are_what_it_writes() {
     assert!(include_str!("battery.csv") == battery());
     assert!(include_str!("heater_steps.csv") == heater_steps());
     assert!(include_str!("dc_motor.csv") == dc_motor());
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/templates");
+    for (name, log) in simulated_templates::logs() {
+        assert!(
+            std::fs::read_to_string(folder.join(format!("{name}.csv"))).is_ok_and(|text| text == log),
+            "{name}"
+        );
+    }
 }

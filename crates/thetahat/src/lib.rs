@@ -74,6 +74,7 @@
 //! | [`options`] | options as data: tables of them, and those that were given in JSON |
 //! | [`plan`] | the options of a fit: a plan |
 //! | [`fit`] | from options to a model of any kind |
+//! | [`templates`] | plants that are ready, with start values from a log |
 //! | [`report`] | the whole way from a log to a document and its page |
 //! | [`track`] | models that are estimated while the plant runs |
 //! | [`filter`] | states that are estimated while the plant runs |
@@ -109,6 +110,7 @@ pub mod respond;
 pub mod select;
 pub mod spectrum;
 pub mod step_test;
+pub mod templates;
 #[cfg(test)]
 mod tests;
 pub mod track;

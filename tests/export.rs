@@ -453,9 +453,9 @@ fn observers_hold_the_innovations_of_filter() {
     let motor = include_str!("data/dc_motor.toml");
     let line = motor.replace("voltage = \"u\"", "voltage = { channel = \"u\", hold = \"linear\" }");
     let noisy = |text: &str| {
-        text.replace("friction * speed)", "friction * speed - 1e-7 * speed * abs(speed))")
-            .replace("speed = 0.2 }", "speed = \"0.1 + 0.01 * abs(voltage)\" }")
-            .replace("speed = 0.3 }", "speed = \"0.2 + 0.001 * abs(speed)\" }")
+        text.replace("friction * speed)", "friction * speed - 1e-9 * speed^3)")
+            .replace("speed = 0.2 }", "speed = \"0.1 + 0.01 * voltage^2\" }")
+            .replace("speed = 0.3 }", "speed = \"0.2 + 1e-5 * speed^2\" }")
     };
     folder.write("motor.toml", motor);
     folder.write("line.toml", &line);

@@ -73,8 +73,8 @@ struct Run<'e> {
     pasts: Vec<Option<Array>>,
     transition: &'e Compiled,
     step: Step,
-    /// Of an exact step Psi and X.
-    exact: Option<[Array; 2]>,
+    /// Of an exact step Psi, and X where an input goes in a line.
+    exact: Option<(Array, Option<Array>)>,
     observation: &'e Compiled,
     states: usize,
     inputs: usize,
@@ -149,10 +149,9 @@ impl<'e> Run<'e> {
         let exact = matrices.map(|[_, integral, second, _]| {
             let mut square =
                 |name: &str, doc: &str, of: &[f64]| program.table(name, doc, transposed(of, states));
-            [
-                square("PSI", "What a derivative that stays leaves to the state, row by row.", &integral),
-                square("X", "What one that grows by 1 in a second does.", &second),
-            ]
+            let stays = "What a derivative that stays leaves to the state, row by row.";
+            let integral = square("PSI", stays, &integral);
+            (integral, ahead.map(|_| square("X", "What one that grows by 1 in a second does.", &second)))
         });
         let sample_time = model.sample_time;
         Self {
@@ -335,7 +334,7 @@ impl<'e> Run<'e> {
     /// The exact step x + Psi f + X (f(end) - f)/dt.
     fn exactly(&self, program: &mut Program) -> Vec<Statement> {
         let (n, x, rate) = (self.states, self.x, self.rate);
-        let Some([integral, second]) = self.exact else { return Vec::new() };
+        let Some((integral, second)) = self.exact else { return Vec::new() };
         let moved = program.memory("moved_x", "The state after the step.", vec![0.0; n]);
         let add = |program: &mut Program, into: Array, matrix: Array, of: Array| {
             program.repeat(n, |program, i| {
@@ -348,7 +347,7 @@ impl<'e> Run<'e> {
         let mut body = self.rates(program, &self.leaves(x, None, Some(0.0.into()), 0.0), None);
         body.extend(program.repeat(n, |_, i| vec![Statement::Store(moved, i.clone(), x.at(i))]));
         body.extend(add(program, moved, integral, rate));
-        if self.ahead.is_some() {
+        if let Some(second) = second {
             let bend = program.memory("bend", "How fast the derivative grows.", vec![0.0; n]);
             body.extend(program.repeat(n, |_, i| vec![Statement::Store(bend, i.clone(), rate.at(i))]));
             body.extend(self.rates(program, &self.leaves(x, None, Some(1.0.into()), 0.0), None));

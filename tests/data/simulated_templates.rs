@@ -201,6 +201,31 @@ fn exchanger() -> String {
     csv
 }
 
+/// An axis of a multirotor, 250 rows a second: 120 rad/s^2 for a command of 1, a lag of 0.04 s, a delay of 0.018 s, a
+/// damping of 0.5 1/s and a trim of 0.4 rad/s^2.
+fn multirotor() -> String {
+    const STEP: f64 = 0.004;
+    const PARTS: usize = 100;
+    let mut random = Random(91);
+    let (mut rate, mut motor, mut command) = (0.0, 0.0, 0.0);
+    let mut commands: Vec<f64> = Vec::new();
+    let mut csv = String::from("t,command,rate\n");
+    for k in 0..1200 {
+        // Against what has come of the commands before, as a pilot does.
+        let back = if rate > 2.0 { -0.1 } else if rate < -2.0 { 0.1 } else { 0.0 };
+        command = if k < 10 { 0.0 } else { random.switched(command, &[back - 0.1, back, back + 0.1], 20.0) };
+        commands.push(command);
+        let _ = writeln!(csv, "{:.3},{command:.1},{:.4}", f64::from(k) * STEP, rate + 0.02 * random.normal());
+        for part in 0..PARTS {
+            let samples = f64::from(k) + (part as f64 + 0.5) / PARTS as f64 - 0.018 / STEP;
+            let given = commands[samples.max(0.0) as usize];
+            motor += STEP / PARTS as f64 * (120.0 * given - motor) / 0.04;
+            rate += STEP / PARTS as f64 * (motor - 0.5 * rate + 0.4);
+        }
+    }
+    csv
+}
+
 /// All of them, by their files.
 pub(super) fn logs() -> Vec<(&'static str, String)> {
     vec![
@@ -216,5 +241,6 @@ pub(super) fn logs() -> Vec<(&'static str, String)> {
         ("pendulum", pendulum()),
         ("spring", spring()),
         ("exchanger", exchanger()),
+        ("multirotor", multirotor()),
     ]
 }

@@ -35,6 +35,7 @@ mod exchanger;
 mod mechanism;
 mod modulated;
 mod motor;
+mod multirotor;
 mod pendulum;
 mod room;
 mod spring;
@@ -100,7 +101,7 @@ pub struct Setting {
 }
 
 /// All of them.
-static TEMPLATES: [&Template; 12] = [
+static TEMPLATES: [&Template; 13] = [
     &motor::MOTOR,
     &mechanism::MECHANISM,
     &mechanism::ELEVATOR,
@@ -113,6 +114,7 @@ static TEMPLATES: [&Template; 12] = [
     &pendulum::PENDULUM,
     &spring::SPRING,
     &exchanger::EXCHANGER,
+    &multirotor::MULTIROTOR,
 ];
 
 impl Template {

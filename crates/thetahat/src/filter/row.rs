@@ -146,7 +146,7 @@ impl Row {
     }
 
     /// The roots of S_ii = h_i'P h_i + R_ii, with the covariance of the prediction.
-    pub(super) fn output_deviations(&mut self, kind: &Kind, h: &DMatrix<f64>) {
+    pub(super) fn output_deviations(&mut self, h: &DMatrix<f64>, noise: &DMatrix<f64>) {
         let (size, outputs) = (self.predicted.len(), self.output_deviations.len());
         let h = h.as_slice();
         for (output, deviation) in self.output_deviations.iter_mut().enumerate() {
@@ -156,7 +156,7 @@ impl Row {
                 let column = &self.covariance[i * size..(i + 1) * size];
                 variance += h[output + i * outputs] * column.iter().zip(row).map(|(p, h)| p * h).sum::<f64>();
             }
-            *deviation = (variance.max(0.0) + kind.output_variance(output)).sqrt();
+            *deviation = (variance.max(0.0) + noise[(output, output)]).sqrt();
         }
     }
 

@@ -4,6 +4,7 @@ use super::StateFilter;
 use super::estimate::StateValues;
 use super::kind::Kind;
 use super::linearization::Work;
+use super::past::Past;
 use crate::Error;
 
 /// The states of a record, each given all of its rows, later ones too.
@@ -74,16 +75,18 @@ impl StateFilter {
         let overflow =
             |error: thetahat_core::Error| Error::data(format!("the states cannot be smoothed: {error}"));
         let mut smoother = Smoother::new(kind.started().map_err(overflow)?);
-        let mut work = Work::default();
+        let (mut past, mut work) = (Past::new(kind), Work::new());
         // Which of the smoother's samples a row is.
         let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
         let mut previous = None;
         for (division, sample) in history {
+            past.push(sample);
             if let Some((previous, division)) = previous.zip(*division) {
-                kind.predict(&mut smoother, previous, sample, division, &mut work).map_err(overflow)?;
+                let known = (&past, &mut work);
+                kind.predict(&mut smoother, previous, sample, division, known).map_err(overflow)?;
                 place += division.0;
             }
-            kind.correct(&mut smoother, sample, &mut work, |_, _| ()).map_err(overflow)?;
+            kind.correct(&mut smoother, sample, (&past, &mut work), |_, _, _| ()).map_err(overflow)?;
             places.push(place);
             previous = Some(sample);
         }

@@ -220,10 +220,10 @@ fn fit(
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let fitted_to = experiments(model, log, &shares.estimation, &shares.estimation)?;
     let found = search(&fitted_to)?;
-    let Errors { nis, mse } = errors(model, &fitted_to, &found)?;
+    let Errors { nis, mse, noise } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
     let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());
-    let fitted = EquationsModel::new(model, &found.values, covariance.collect());
+    let fitted = EquationsModel::new(model, &found.values, covariance.collect(), &noise);
 
     let segments = fitted_to.iter().flat_map(|experiment| {
         let rows = experiment.counted().iter();
@@ -282,6 +282,8 @@ struct Errors {
     nis: Option<NisSummary>,
     /// The mean of (y - h(x^))^2.
     mse: f64,
+    /// The mean variance of the noise of each output.
+    noise: Vec<f64>,
 }
 
 fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate) -> Result<Errors, Error> {
@@ -289,6 +291,7 @@ fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate
     let mut row = None;
     let (mut nis, mut measured) = (0.0, 0);
     let mut squares = 0.0;
+    let mut noise = vec![(0.0, 0.0); model.outputs().len()];
     let mut add = |nis: f64, measured: usize| {
         if let Some(bounds) = chi_square_interval(measured) {
             count.add(nis, measured, bounds);
@@ -301,9 +304,12 @@ fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate
         }
         nis += innovation.error * innovation.error / innovation.variance;
         measured += 1;
+        noise[at.output].0 += innovation.noise;
+        noise[at.output].1 += 1.0;
         squares += (experiments[at.log].output(at.row)[at.output] - prediction).powi(2);
     })
     .map_err(|failure| failure.error(experiments))?;
     add(nis, measured);
-    Ok(Errors { nis: count.summary(), mse: squares / found.samples as f64 })
+    let noise = noise.into_iter().map(|(sum, count)| if count == 0.0 { 0.0 } else { sum / count }).collect();
+    Ok(Errors { nis: count.summary(), mse: squares / found.samples as f64, noise })
 }

@@ -20,8 +20,8 @@ pub(super) struct Draft {
     /// State and its equation.
     pub(super) equations: Vec<(&'static str, String)>,
     pub(super) outputs: Vec<Output>,
-    /// State and what a sample adds to it.
-    pub(super) process: Vec<(&'static str, f64)>,
+    /// State, the output whose noise tells the scale, and what part of that a sample adds to the state, to start from.
+    pub(super) process: Vec<(&'static str, usize, f64)>,
     pub(super) figures: Vec<Figure>,
 }
 
@@ -125,13 +125,13 @@ impl Draft {
             let _ = writeln!(text, "{line:<44} # {}", task.template.columns[*column].unit);
         }
         text.push_str("\n[noise]\n");
+        let unknown = |name: &str, start: f64| format!("{name} = {{ start = {}, unknown = true }}", short(start));
         if !self.process.is_empty() {
-            let each = self.process.iter().map(|(state, sd)| format!("{state} = {}", short(*sd)));
+            let each = self.process.iter();
+            let each = each.map(|(state, output, part)| unknown(state, part * self.outputs[*output].noise));
             let _ = writeln!(text, "process = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         }
-        let each = self.outputs.iter();
-        let each =
-            each.map(|output| format!("{} = {}", quoted(task.channel(output.column)), short(output.noise)));
+        let each = self.outputs.iter().map(|output| unknown(&quoted(task.channel(output.column)), output.noise));
         let _ = writeln!(text, "measurement = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         if !self.figures.is_empty() {
             text.push_str("\n[figures]\n");

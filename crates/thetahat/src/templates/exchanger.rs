@@ -172,6 +172,7 @@ fn written(task: &Task<'_>, [holdup, ua, inlet, medium]: [f64; 4], mean: f64) ->
             figure("time_constant", "holdup / (mean_flow + ua / heat_capacity)", "s"),
             figure("residence_time", "holdup / mean_flow", "s"),
         ],
+        process: vec![("outlet", 0, 0.1)],
         ..Draft::default()
     }
 }

@@ -270,6 +270,7 @@ fn written(task: &Task<'_>, kind: Kind, [ks, kv, ka, kg, offset]: Gains) -> Draf
         equations,
         outputs,
         figures: figures(kind),
+        process: vec![("velocity", 0, 0.1)],
         ..Draft::default()
     }
 }

@@ -165,6 +165,7 @@ fn written(task: &Task<'_>, [r, l, k, inertia, friction, dry]: [f64; 6], width: 
             figure("stall_current", "rated_voltage / resistance", "A"),
             figure("stall_torque", "torque_constant * stall_current - dry_friction", "N m"),
         ],
+        process: vec![("speed", 1, 0.1)],
         ..Draft::default()
     }
 }

@@ -118,6 +118,7 @@ fn written(task: &Task<'_>, [length, damping, zero]: [f64; 3], inertia: Option<f
             figure("damping_ratio", "damping / (2 * sqrt(gravity / length))", ""),
             figure("decay_time", "2 / damping", "s"),
         ],
+        process: vec![("rate", 0, 0.1 * frequency)],
         ..Draft::default()
     }
 }

@@ -169,6 +169,7 @@ fn common(task: &Task<'_>, aperture: f64, ambient: f64) -> (Draft, &'static str,
             expression: "temperature".to_owned(),
             noise: task.noise(TEMPERATURE),
         }],
+        process: vec![("temperature", 0, 0.1)],
         ..Draft::default()
     };
     let mut sunshine = "";

@@ -96,6 +96,7 @@ fn written(task: &Task<'_>, [mass, stiffness, damping, rest]: [f64; 4]) -> Draft
             figure("compliance", "1 / stiffness", "m/N"),
             figure("decay_time", "2 * mass / damping", "s"),
         ],
+        process: vec![("velocity", 0, 0.1 * frequency)],
         ..Draft::default()
     }
 }

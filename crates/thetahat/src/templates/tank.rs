@@ -96,6 +96,7 @@ fn written(task: &Task<'_>, area: f64, outflow: f64) -> Draft {
             // The outlet of a discharge coefficient of 1.
             figure("outlet_area", "outflow / sqrt(2 * 9.80665)", "m^2"),
         ],
+        process: vec![("level", 0, 0.1)],
         ..Draft::default()
     }
 }

@@ -94,19 +94,20 @@ impl GreyBox {
     /// The figures of the model with these parameters z, of which this is the covariance before the change of variable.
     pub(crate) fn figures(&self, z: &[f64], covariance: &[Vec<f64>]) -> Vec<DerivedFigure> {
         let Figures { names, program } = &self.figures;
-        let leaves = Leaves { states: &[], parameters: z, inputs: &[], time: 0.0, step: 0.0 };
+        let leaves = Leaves::of_parameters(z);
         let mut work = vec![0.0; program.size()];
         let results: Vec<f64> = program.run(&leaves, &mut work).collect();
         let (values, slopes) = results.split_at(names.len());
-        let by_parameter = |figure: usize| -> Vec<f64> {
-            let slopes = slopes.iter().skip(figure).step_by(names.len().max(1));
-            let unknown = self.unknown.iter().zip(z);
-            unknown.zip(slopes).map(|((unknown, &z), slope)| slope / unknown.scale.slope(z)).collect()
+        // The derivatives by those parameters that it depends on: a noise may be at its bound, and has no error there.
+        let by_parameter = |figure: usize| -> Vec<(usize, f64)> {
+            let slopes = slopes.iter().skip(figure).step_by(names.len().max(1)).enumerate();
+            let slopes = slopes.filter(|(_, slope)| **slope != 0.0);
+            slopes.map(|(index, slope)| (index, slope / self.unknown[index].scale.slope(z[index]))).collect()
         };
         let figure = |(index, ((name, unit), &value)): (usize, (&(String, Option<String>), &f64))| {
             let slopes = by_parameter(index);
-            let products = slopes.iter().zip(covariance).map(|(slope, row)| {
-                slope * row.iter().zip(&slopes).map(|(entry, slope)| entry * slope).sum::<f64>()
+            let products = slopes.iter().flat_map(|&(i, one)| {
+                slopes.iter().map(move |&(j, other)| one * covariance[i][j] * other)
             });
             let error = products.sum::<f64>().max(0.0).sqrt();
             DerivedFigure {

@@ -48,6 +48,16 @@ pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &
             outcome.search.iterations
         )),
     }
+    let vanishing = model.parameters.iter().zip(&outcome.unknown);
+    let vanishing =
+        vanishing.filter(|(own, known)| own.standard_error.is_none() && known.min == Some(own.value));
+    let vanishing: Vec<String> = vanishing.map(|(own, _)| own.name.clone()).collect();
+    if !vanishing.is_empty() {
+        warnings.push(format!(
+            "the log shows no sign of {}: the likelihood is largest without, at the lower bound, where there is no standard error",
+            listed(&vanishing)
+        ));
+    }
     let deviation = |index: usize| model.parameters[index].standard_error.unwrap_or(f64::NAN);
     for (index, (parameter, known)) in model.parameters.iter().zip(&outcome.unknown).enumerate() {
         for bound in [known.min, known.max].into_iter().flatten() {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use crate::harness::Folder;
 use crate::signals::{Experiment, csv};
 
-const VERBS: [&str; 23] = [
+const VERBS: [&str; 24] = [
     "fit",
     "inspect",
     "spectrum",
@@ -25,6 +25,7 @@ const VERBS: [&str; 23] = [
     "export",
     "impulse",
     "design",
+    "templates",
     "demo",
     "schema",
     "completions",

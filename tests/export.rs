@@ -694,3 +694,28 @@ fn controllers_control() {
         folder.assert_refused(&format!("export {line}"), 2, words);
     }
 }
+
+/// Takes 30 s: what each template finds is compiled in Rust and C and run.
+#[test]
+fn templates_say_what_the_library_does() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/templates");
+    for (name, purpose) in [
+        ("motor", "predictor"),
+        ("mechanism", "simulator"),
+        ("elevator", "predictor"),
+        ("arm", "simulator"),
+        ("battery", "observer"),
+        ("battery2", "simulator"),
+        ("room", "predictor"),
+        ("room2", "observer"),
+        ("tank", "predictor"),
+        ("pendulum", "simulator"),
+        ("spring", "observer"),
+        ("exchanger", "predictor"),
+        ("multirotor", "simulator"),
+    ] {
+        let folder = Folder::with_log(fs::read(data.join(format!("{name}.csv"))).expect("its log"));
+        folder.done(&format!("fit --grey template:{name} log.csv --max-iterations 3 --report r.json"));
+        goes_round_once(&folder, "r.json", "log.csv", purpose, "f64");
+    }
+}

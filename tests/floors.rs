@@ -106,7 +106,7 @@ const PYTHON: House = House {
         &["journal", "work"],
         &["array", "plan"],
         &["grey_box", "log"],
-        &["model"],
+        &["model", "templates"],
         &["online"],
         &["design", "evaluation", "experiments", "filter", "normal_equations", "track"],
     ],

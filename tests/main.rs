@@ -65,6 +65,7 @@ mod state_space;
 mod step;
 mod stream;
 mod tables_and_branches;
+mod templates;
 mod terminal;
 mod track;
 mod track_live;

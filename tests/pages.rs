@@ -193,8 +193,8 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");
-    for subfolder in
-        ["tests/data/public", "tests/data/columnar", "tests/data/flights", "tests/data/spreadsheets"]
+    for subfolder in ["public", "columnar", "flights", "spreadsheets", "templates"]
+        .map(|name| format!("tests/data/{name}"))
     {
         fs::create_dir_all(folder.path(subfolder)).expect("the folder can be written to");
     }
@@ -202,8 +202,9 @@ fn run(page: &Page) -> usize {
     let columnar = files("tests/data/columnar", ".parquet");
     let flights = files("tests/data/flights", ".ulg");
     let sheets = files("tests/data/spreadsheets", ".xlsx");
+    let templates = files("tests/data/templates", ".csv");
     let own = [files("tests/data", ".toml"), files("tests/data", ".csv")].concat();
-    for file in [own, public, columnar, flights, sheets].concat() {
+    for file in [own, public, columnar, flights, sheets, templates].concat() {
         folder.write(&file, fs::read(root().join(&file)).expect("data"));
     }
     let (mut compared, mut code) = (0, 0);
@@ -337,8 +338,26 @@ fn what_is_wrong_with_a_link_is_seen() {
 fn options_that_pages_name_exist() {
     let folder = Folder::new();
     let verbs = [
-        "fit", "inspect", "predict", "simulate", "validate", "compare", "track", "filter", "bode", "step",
-        "impulse", "spectrum", "design", "tune", "control", "reduce", "convert", "model", "export",
+        "fit",
+        "inspect",
+        "predict",
+        "simulate",
+        "validate",
+        "compare",
+        "track",
+        "filter",
+        "bode",
+        "step",
+        "impulse",
+        "spectrum",
+        "design",
+        "tune",
+        "control",
+        "reduce",
+        "convert",
+        "model",
+        "export",
+        "templates",
     ];
     let help: String = verbs.iter().map(|verb| folder.done(&format!("{verb} --help")).stdout).collect();
     let known: Vec<&str> = help.split(|c: char| !c.is_ascii_lowercase() && c != '-').collect();

@@ -26,9 +26,9 @@ pub(crate) struct TemplatesArguments {
     pub(crate) logs: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) template: TemplateOptionArguments,
-    /// The rows that start values are found from, such as 1..500 [default: all]
-    #[arg(long, value_name = "FROM..TO", help_heading = "Model")]
-    pub(crate) rows: Vec<String>,
+    /// The rows that are fitted to, such as 1..500, from which start values are found [default: all]
+    #[arg(long, value_name = "ROWS", help_heading = "Model")]
+    pub(crate) estimate: Vec<String>,
 
     #[command(flatten)]
     pub(crate) clock: ClockArguments,

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use thetahat::Error;
 use thetahat::data::{Log, Rows};
 use thetahat::model::GreyBox;
+use thetahat::report::EquationsPlan;
 use thetahat::templates::{Columns, Template};
 
 use crate::args::TemplatesArguments;
@@ -21,7 +22,9 @@ pub(crate) fn templates(arguments: &TemplatesArguments) -> Result<(), Failure> {
     if job.paths.is_empty() {
         return output::print(&template.summary());
     }
-    let (model, joined) = of_logs(template, &job.paths, &job.log, &job.options, |_| Ok(job.rows.clone()))?;
+    let plan = EquationsPlan { estimate: job.rows.clone(), ..EquationsPlan::default() };
+    let rows = |log: &Log| plan.fitted_rows(log.rows());
+    let (model, joined) = of_logs(template, &job.paths, &job.log, &job.options, rows)?;
     joined.warnings.iter().for_each(|warning| warn(warning));
     output::print(model.text())
 }

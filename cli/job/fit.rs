@@ -80,10 +80,9 @@ impl FitJob {
             Some((_, Some(name))) => {
                 let template = Template::named(name).map_err(|error| Failure::option(&error))?;
                 if arguments.logs.is_empty() {
-                    let summary = template.summary();
+                    let (name, wants) = (template.name, template.wants());
                     return Err(Failure::usage(format!(
-                        "name the logs to fit {} to\n\n{summary}",
-                        template.name
+                        "name the logs to fit {name} to: it {wants}; thetahat templates {name} says more"
                     )));
                 }
                 Some(Equations::Template(template))

@@ -56,7 +56,7 @@ impl TemplatesJob {
             template: arguments.name.as_ref().map(named).transpose()?,
             paths: arguments.logs.clone(),
             options: TemplateOptions::resolve(&arguments.template)?,
-            rows: rows("--rows", &arguments.rows)?,
+            rows: rows("--estimate", &arguments.estimate)?,
             log: LogJob::resolve(&arguments.log, &arguments.clock)?,
         })
     }

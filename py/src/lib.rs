@@ -19,6 +19,7 @@ mod model;
 mod normal_equations;
 mod online;
 mod plan;
+mod templates;
 mod track;
 mod work;
 
@@ -60,6 +61,8 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_response, module)?)?;
+    module.add_function(wrap_pyfunction!(templates::template, module)?)?;
+    module.add_function(wrap_pyfunction!(templates::templates, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::validate, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::compare, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::inspect, module)?)?;

@@ -212,7 +212,13 @@ fn multirotor() -> String {
     let mut csv = String::from("t,command,rate\n");
     for k in 0..1200 {
         // Against what has come of the commands before, as a pilot does.
-        let back = if rate > 2.0 { -0.1 } else if rate < -2.0 { 0.1 } else { 0.0 };
+        let back = if rate > 2.0 {
+            -0.1
+        } else if rate < -2.0 {
+            0.1
+        } else {
+            0.0
+        };
         command = if k < 10 { 0.0 } else { random.switched(command, &[back - 0.1, back, back + 0.1], 20.0) };
         commands.push(command);
         let _ = writeln!(csv, "{:.3},{command:.1},{:.4}", f64::from(k) * STEP, rate + 0.02 * random.normal());

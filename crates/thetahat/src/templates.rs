@@ -166,6 +166,11 @@ impl Template {
         start::best(&task, drafts)
     }
 
+    /// The columns that it wants with their units, in a few words.
+    pub fn wants(&self) -> String {
+        columns::wants(self.columns)
+    }
+
     /// What it wants and finds, in lines.
     pub fn summary(&self) -> String {
         let mut text = format!("{}: {}\n\ncolumns\n", self.name, self.title);

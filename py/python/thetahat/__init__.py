@@ -11,7 +11,8 @@ Fits            `fit` takes the model that the data ask for, `search` chooses am
   polynomials   `arx`, `armax`, `oe`, `bj`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
   time series   `arima` with differences and seasons, `ar`, `arma`.
   others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations,
-                with `table`, `where` and `delayed`.
+                with `table`, `where` and `delayed`;
+                `templates` of plants that are ready.
 Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
                 `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
                 `compare` lays several side by side.
@@ -84,6 +85,7 @@ from thetahat.engine.options import ReadOptions
 from thetahat.experiments.design import ExperimentDesign, TestSignal, design
 from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
+from thetahat.fits import templates as templates
 from thetahat.fits.arima import arima
 from thetahat.fits.comparison import Comparison, compare
 from thetahat.fits.expressions import delayed, table, where
@@ -214,6 +216,8 @@ __all__ = [
     "ss",
     "step_test",
     "table",
+    "templates",
+    "templates",
     "tf",
     "topics",
     "tune",

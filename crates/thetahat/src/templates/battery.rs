@@ -81,14 +81,7 @@ pub(super) static BATTERY: Template = Template {
     title: "a battery with its table of open-circuit voltages, a resistance, and one RC pair",
     columns: COLUMNS,
     settings: SETTINGS,
-    parameters: &[
-        ("r0", "Ohm"),
-        ("r1", "Ohm"),
-        ("tau1", "s"),
-        ("ocv_1", "V"),
-        ("ocv_2", "V"),
-        ("ocv_3", "V"),
-    ],
+    parameters: &[("r0", "Ohm"), ("r1", "Ohm"), ("tau1", "s"), ("ocv_…", "V")],
     draft: |task| draft(task, 1),
 };
 
@@ -97,16 +90,7 @@ pub(super) static BATTERY_TWO: Template = Template {
     title: "a battery with its table of open-circuit voltages, a resistance, and two RC pairs",
     columns: COLUMNS,
     settings: SETTINGS,
-    parameters: &[
-        ("r0", "Ohm"),
-        ("r1", "Ohm"),
-        ("tau1", "s"),
-        ("r2", "Ohm"),
-        ("tau2", "s"),
-        ("ocv_1", "V"),
-        ("ocv_2", "V"),
-        ("ocv_3", "V"),
-    ],
+    parameters: &[("r0", "Ohm"), ("r1", "Ohm"), ("tau1", "s"), ("r2", "Ohm"), ("tau2", "s"), ("ocv_…", "V")],
     draft: |task| draft(task, 2),
 };
 
@@ -316,7 +300,8 @@ fn written(task: &Task<'_>, found: &Solution, knots: &[f64], capacity: f64, firs
     for (place, (knot, value)) in knots.iter().zip(&found.ocv).enumerate() {
         let name = format!("ocv_{}", place + 1);
         table.push(format!("{}:{name}", rounded(*knot)));
-        parameters.push(Parameter::free(name, "V", *value, 0.2 * task.span(VOLTAGE)));
+        let unit = format!("V at {}", rounded(*knot));
+        parameters.push(Parameter::free(name, unit, *value, 0.2 * task.span(VOLTAGE)));
     }
     parameters.push(Parameter::known("capacity", "Ah", capacity));
     let mut figures = vec![

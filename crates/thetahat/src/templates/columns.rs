@@ -140,7 +140,7 @@ fn missing(template: &Template, column: &Column, header: &[String]) -> Error {
 }
 
 /// What a template wants, in words.
-fn wants(columns: &[Column]) -> String {
+pub(super) fn wants(columns: &[Column]) -> String {
     let each = columns.iter().map(|column| {
         let optional = if column.optional { " if it is there" } else { "" };
         format!("{} [{}]{optional}", column.name, column.unit)

@@ -36,7 +36,7 @@ pub(super) struct State {
 #[derive(Debug, Clone)]
 pub(super) struct Parameter {
     pub(super) name: String,
-    pub(super) unit: &'static str,
+    pub(super) unit: String,
     pub(super) start: f64,
     /// How far off the start may be; none for what is known.
     pub(super) deviation: Option<f64>,
@@ -65,18 +65,18 @@ pub(super) fn figure(name: &'static str, expression: &'static str, unit: &'stati
 
 impl Parameter {
     /// An unknown one above 0.
-    pub(super) fn positive(name: impl Into<String>, unit: &'static str, start: f64) -> Self {
-        Self { name: name.into(), unit, start, deviation: Some(start.abs()), min: Some(0.0) }
+    pub(super) fn positive(name: impl Into<String>, unit: impl Into<String>, start: f64) -> Self {
+        Self { name: name.into(), unit: unit.into(), start, deviation: Some(start.abs()), min: Some(0.0) }
     }
 
     /// An unknown one of any sign, which may be so far off.
-    pub(super) fn free(name: impl Into<String>, unit: &'static str, start: f64, deviation: f64) -> Self {
-        Self { name: name.into(), unit, start, deviation: Some(deviation), min: None }
+    pub(super) fn free(name: impl Into<String>, unit: impl Into<String>, start: f64, deviation: f64) -> Self {
+        Self { name: name.into(), unit: unit.into(), start, deviation: Some(deviation), min: None }
     }
 
     /// One that is known.
-    pub(super) fn known(name: impl Into<String>, unit: &'static str, value: f64) -> Self {
-        Self { name: name.into(), unit, start: value, deviation: None, min: None }
+    pub(super) fn known(name: impl Into<String>, unit: impl Into<String>, value: f64) -> Self {
+        Self { name: name.into(), unit: unit.into(), start: value, deviation: None, min: None }
     }
 }
 
@@ -125,13 +125,15 @@ impl Draft {
             let _ = writeln!(text, "{line:<44} # {}", task.template.columns[*column].unit);
         }
         text.push_str("\n[noise]\n");
-        let unknown = |name: &str, start: f64| format!("{name} = {{ start = {}, unknown = true }}", short(start));
+        let unknown =
+            |name: &str, start: f64| format!("{name} = {{ start = {}, unknown = true }}", short(start));
         if !self.process.is_empty() {
             let each = self.process.iter();
             let each = each.map(|(state, output, part)| unknown(state, part * self.outputs[*output].noise));
             let _ = writeln!(text, "process = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         }
-        let each = self.outputs.iter().map(|output| unknown(&quoted(task.channel(output.column)), output.noise));
+        let each =
+            self.outputs.iter().map(|output| unknown(&quoted(task.channel(output.column)), output.noise));
         let _ = writeln!(text, "measurement = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         if !self.figures.is_empty() {
             text.push_str("\n[figures]\n");

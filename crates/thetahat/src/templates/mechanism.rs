@@ -256,7 +256,7 @@ fn written(task: &Task<'_>, kind: Kind, [ks, kv, ka, kg, offset]: Gains) -> Draf
         parameters.push(Parameter::free("offset", "rad", offset, 0.5));
     }
     parameters.extend(
-        SETTINGS.iter().map(|Setting { name, unit, .. }| Parameter::known(*name, unit, task.setting(name))),
+        SETTINGS.iter().map(|Setting { name, unit, .. }| Parameter::known(*name, *unit, task.setting(name))),
     );
     Draft {
         about: vec![

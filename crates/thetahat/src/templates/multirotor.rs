@@ -35,7 +35,18 @@ pub(super) static MULTIROTOR: Template = Template {
             unit: "rad/s",
             meaning: "angular rate of the axis",
             optional: false,
-            aliases: &["gyro", "omega", "p", "q", "r", "y", "rollspeed", "pitchspeed", "yawspeed", "angular_velocity"],
+            aliases: &[
+                "gyro",
+                "omega",
+                "p",
+                "q",
+                "r",
+                "y",
+                "rollspeed",
+                "pitchspeed",
+                "yawspeed",
+                "angular_velocity",
+            ],
         },
     ],
     settings: &[Setting {
@@ -44,7 +55,13 @@ pub(super) static MULTIROTOR: Template = Template {
         default: None,
         meaning: "time constant that the rate loop is to have; else the lag of the motors as it starts",
     }],
-    parameters: &[("gain", "rad/s^2"), ("motor_lag", "s"), ("delay", "s"), ("damping", "1/s"), ("trim", "rad/s^2")],
+    parameters: &[
+        ("gain", "rad/s^2"),
+        ("motor_lag", "s"),
+        ("delay", "s"),
+        ("damping", "1/s"),
+        ("trim", "rad/s^2"),
+    ],
     draft,
 };
 
@@ -86,10 +103,17 @@ fn written(task: &Task<'_>, [gain, lag, delay, damping, trim]: [f64; 5]) -> Resu
     let torque = gain.abs() * task.largest(COMMAND);
     let loop_time = super::task::above_zero("loop_time", task.known("loop_time").unwrap_or(lag))?;
     Ok(Draft {
-        about: vec!["An axis of a multirotor: the motors answer a command after a delay, and with a lag.".to_owned()],
+        about: vec![
+            "An axis of a multirotor: the motors answer a command after a delay, and with a lag.".to_owned(),
+        ],
         states: vec![
             State { name: "rate", unit: "rad/s", start, deviation },
-            State { name: "motor", unit: "rad/s^2", start: gain * task.first(COMMAND).0, deviation: 0.3 * torque },
+            State {
+                name: "motor",
+                unit: "rad/s^2",
+                start: gain * task.first(COMMAND).0,
+                deviation: 0.3 * torque,
+            },
         ],
         inputs: vec![("command", COMMAND)],
         parameters: vec![

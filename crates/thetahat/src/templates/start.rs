@@ -5,6 +5,7 @@ use super::task::Task;
 use crate::Error;
 use crate::model::GreyBox;
 use crate::respond::equations::{Experiment, Predictor, experiments, walk};
+use crate::text::brief;
 
 /// The model that explains the log best, with the noise of measurements that it leaves.
 pub(super) fn best(task: &Task<'_>, drafts: Vec<Draft>) -> Result<GreyBox, Error> {
@@ -27,10 +28,26 @@ pub(super) fn best(task: &Task<'_>, drafts: Vec<Draft>) -> Result<GreyBox, Error
         );
         return Err(Error::undetermined(Vec::new(), message));
     };
+    all_known_are_in(task, &draft)?;
     for (output, error) in draft.outputs.iter_mut().zip(errors) {
         output.noise = error.max(1e-6 * task.span(output.column)).max(1e-12);
     }
     GreyBox::from_toml(&draft.toml(task))
+}
+
+/// That what is known is a setting or stands in the model.
+fn all_known_are_in(task: &Task<'_>, draft: &Draft) -> Result<(), Error> {
+    let is_there = |name: &String| {
+        task.template.settings.iter().any(|setting| setting.name == name)
+            || draft.parameters.iter().any(|parameter| parameter.name == *name)
+    };
+    match task.known.iter().find(|(name, _)| !is_there(name)) {
+        None => Ok(()),
+        Some((name, _)) => {
+            let message = format!("the model of this log has no '{}'; leave it out", brief(name, 40));
+            Err(Error::argument("known", message))
+        }
+    }
 }
 
 struct Evaluated {

@@ -10,7 +10,7 @@ pub(super) struct Task<'a> {
     pub(super) template: &'a Template,
     pub(super) log: &'a Log,
     columns: &'a Columns,
-    known: &'a [(String, f64)],
+    pub(super) known: &'a [(String, f64)],
     /// The rows that it may use.
     pub(super) rows: Vec<Rows>,
     /// A run for each experiment.
@@ -39,7 +39,9 @@ impl<'a> Task<'a> {
             let settings = template.settings.iter().map(|setting| setting.name);
             let names: Vec<&str> =
                 settings.chain(template.parameters.iter().map(|(name, _)| *name)).collect();
-            if !names.contains(&name.as_str()) {
+            // What a log decides how many of there are ends with an ellipsis.
+            let is_one = |own: &&str| own.strip_suffix('…').map_or(*own == name, |own| name.starts_with(own));
+            if !names.iter().any(is_one) {
                 let near = suggestion(name, names.iter().copied());
                 let message = format!(
                     "{} has no '{}'{near}; it has {}",

@@ -246,6 +246,21 @@ def _restored(text: str, known: Sequence[tuple[str, float]]) -> GreyBox:
     return made
 
 
+def from_template(
+    log: Log, name: str, columns: Mapping[str, str | None], known: Mapping[str, float], estimate: Any = None, split: Any = None
+) -> GreyBox:
+    """The model of a template for a log, with start values from the rows that are fitted to."""
+    given = [(role, column) for role, column in columns.items() if column is not None]
+    for role, column in given:
+        if not isinstance(column, str):
+            raise TypeError(f"{role}: expected the name of a column, found {_numbers.shown(column)}")
+    numbers = [(word, _number(word, value)) for word, value in known.items()]
+    plan = _options.plan({"estimate": estimate, "split": split}, len(log))
+    made = object.__new__(GreyBox)
+    made._model = _thetahat.template(handle("log", log), name, given, numbers, plan)
+    return made
+
+
 def _plain(name: str, value: Any) -> Any:
     """Numbers of NumPy as those of Python, mappings as dicts."""
     if isinstance(value, Mapping):
@@ -321,7 +336,8 @@ def grey(
         The data, with the channels of the model by name. The clock may be uneven (``uniform=False``); joined logs are experiments that
         each begin as the model says.
     model : GreyBox, str, path or dict
-        The equations.
+        The equations; or ``"template:battery"`` and its like, a plant that is ready, whose columns go by their names in the log, see
+        `thetahat.templates`.
     estimate, validate, split, search, max_iterations, tolerance, step, starts, seed, time_limit
         What to fit to and how, see `thetahat.EquationsOptions`.
 
@@ -364,8 +380,10 @@ def grey(
     >>> model.parameters.round(2)
     array([2.])
     """
-    box = model if isinstance(model, GreyBox) else GreyBox(model)
     data = handle("log", log)
+    if isinstance(model, str) and model.startswith("template:") and "\n" not in model:
+        model = from_template(log, model[len("template:") :], {}, {}, options.get("estimate"), options.get("split"))
+    box = model if isinstance(model, GreyBox) else GreyBox(model)
     if not box.unknown:
         raise ValueError(
             "model: none of its parameters is unknown, so that there is nothing to fit; give one as { start = …, sd = …, unknown = true }, "

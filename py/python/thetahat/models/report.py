@@ -187,6 +187,20 @@ class ReportedModel(Table):
         return _numbers.of_document([parameter["standard_error"] for parameter in self._entries])
 
     @property
+    def figures(self) -> dict[str, tuple[float, float]]:
+        """What the ``[figures]`` of a model in equations ask for: each value with its standard error; empty for other models.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.arx(th.dc_motor(), na=2, nb=2).figures
+        {}
+        """
+        figures = self._own.get("figures", [])
+        numbers = [_numbers.of_document([figure["value"], figure["standard_error"]]) for figure in figures]
+        return {figure["name"]: (float(value), float(error)) for figure, (value, error) in zip(figures, numbers)}
+
+    @property
     def _entries(self) -> list[dict[str, Any]]:
         return list(self._uncertain.get("parameters", []))
 

@@ -106,9 +106,9 @@ impl GreyBox {
         };
         let figure = |(index, ((name, unit), &value)): (usize, (&(String, Option<String>), &f64))| {
             let slopes = by_parameter(index);
-            let products = slopes.iter().flat_map(|&(i, one)| {
-                slopes.iter().map(move |&(j, other)| one * covariance[i][j] * other)
-            });
+            let products = slopes
+                .iter()
+                .flat_map(|&(i, one)| slopes.iter().map(move |&(j, other)| one * covariance[i][j] * other));
             let error = products.sum::<f64>().max(0.0).sqrt();
             DerivedFigure {
                 name: name.clone(),

@@ -139,5 +139,13 @@ fn limited(
     }
     let deviation = deviation.map_or_else(|| spread(value), Ok)?;
     let name = name.to_owned();
-    Ok(Given::Unknown(Unknown { name, scale, start: value, deviation, walk: 0.0, unit: None, of_noise: false }))
+    Ok(Given::Unknown(Unknown {
+        name,
+        scale,
+        start: value,
+        deviation,
+        walk: 0.0,
+        unit: None,
+        of_noise: false,
+    }))
 }

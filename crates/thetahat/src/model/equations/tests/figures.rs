@@ -26,7 +26,7 @@ none = 'sqrt(1 - r)'
 fn figures_have_errors_by_the_delta_method() {
     let model = GreyBox::from_toml(TEXT).unwrap();
     let covariance = vec![vec![0.04, 0.01], vec![0.01, 0.09]];
-    let fitted = EquationsModel::new(&model, &[2.0, 3.0], covariance);
+    let fitted = EquationsModel::new(&model, &[2.0, 3.0], covariance, &[0.01]);
     let [time_constant, rate, none] = fitted.figures.as_slice() else { panic!("{:?}", fitted.figures) };
     assert_eq!((time_constant.name.as_str(), time_constant.unit.as_deref()), ("time_constant", Some("s")));
     assert!((time_constant.value.unwrap() - 6.0).abs() < 1e-12);

@@ -196,7 +196,7 @@ fn run(page: &Page) -> usize {
     for subfolder in ["public", "columnar", "flights", "spreadsheets", "templates"]
         .map(|name| format!("tests/data/{name}"))
     {
-        fs::create_dir_all(folder.path(subfolder)).expect("the folder can be written to");
+        fs::create_dir_all(folder.path(&subfolder)).expect("the folder can be written to");
     }
     let public = files("tests/data/public", ".csv");
     let columnar = files("tests/data/columnar", ".parquet");

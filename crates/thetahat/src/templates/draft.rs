@@ -125,15 +125,26 @@ impl Draft {
             let _ = writeln!(text, "{line:<44} # {}", task.template.columns[*column].unit);
         }
         text.push_str("\n[noise]\n");
-        let unknown =
-            |name: &str, start: f64| format!("{name} = {{ start = {}, unknown = true }}", short(start));
+        let noise = |kind: &str, name: &str, key: &str, start: f64, min: f64| {
+            task.known(&format!("{kind}.{name}")).map_or_else(
+                || {
+                    let min = if min > 0.0 { format!(", min = {}", short(min)) } else { String::new() };
+                    format!("{key} = {{ start = {}, unknown = true{min} }}", short(start))
+                },
+                |value| format!("{key} = {value}"),
+            )
+        };
         if !self.process.is_empty() {
-            let each = self.process.iter();
-            let each = each.map(|(state, output, part)| unknown(state, part * self.outputs[*output].noise));
+            let each = self.process.iter().map(|(state, output, part)| {
+                noise("process", state, state, part * self.outputs[*output].noise, 0.0)
+            });
             let _ = writeln!(text, "process = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         }
-        let each =
-            self.outputs.iter().map(|output| unknown(&quoted(task.channel(output.column)), output.noise));
+        // A sensor is not better than a part of what its values scatter by from row to row, or are rounded to.
+        let each = self.outputs.iter().map(|output| {
+            let (channel, least) = (task.channel(output.column), 0.1 * task.noise(output.column));
+            noise("measurement", channel, &quoted(channel), output.noise.max(2.0 * least), least)
+        });
         let _ = writeln!(text, "measurement = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         if !self.figures.is_empty() {
             text.push_str("\n[figures]\n");

@@ -40,6 +40,11 @@ fn all_known_are_in(task: &Task<'_>, draft: &Draft) -> Result<(), Error> {
     let is_there = |name: &String| {
         task.template.settings.iter().any(|setting| setting.name == name)
             || draft.parameters.iter().any(|parameter| parameter.name == *name)
+            || draft.process.iter().any(|(state, ..)| format!("process.{state}") == *name)
+            || draft
+                .outputs
+                .iter()
+                .any(|output| format!("measurement.{}", task.channel(output.column)) == *name)
     };
     match task.known.iter().find(|(name, _)| !is_there(name)) {
         None => Ok(()),

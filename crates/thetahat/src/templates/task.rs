@@ -41,7 +41,8 @@ impl<'a> Task<'a> {
                 settings.chain(template.parameters.iter().map(|(name, _)| *name)).collect();
             // What a log decides how many of there are ends with an ellipsis.
             let is_one = |own: &&str| own.strip_suffix('…').map_or(*own == name, |own| name.starts_with(own));
-            if !names.iter().any(is_one) {
+            let is_noise = name.starts_with("process.") || name.starts_with("measurement.");
+            if !is_noise && !names.iter().any(is_one) {
                 let near = suggestion(name, names.iter().copied());
                 let message = format!(
                     "{} has no '{}'{near}; it has {}",

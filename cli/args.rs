@@ -92,7 +92,7 @@ Examples:
   thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
   thetahat fit --grey spring.toml log.csv --report spring.json
-  thetahat fit --grey template:battery log.csv --columns current=I,voltage=U --known capacity=33.4
+  thetahat fit --grey template:room log.csv --columns temperature=y,heater=u --known process.temperature=0
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),
@@ -328,14 +328,14 @@ Examples:
     Design(Box<DesignArguments>),
     /// Plants that are ready for fit --grey template:NAME: what each wants and finds
     ///
-    /// Without a name it lists them; with one it prints the columns that it wants, with their units, the numbers that it
-    /// takes as known and the parameters that it finds. With logs it writes the model as a text (TOML), with start values
-    /// that are found from them: change it, and fit it with --grey.
+    /// Without a name it lists them; with one it prints the columns that it wants, with their units, the numbers that
+    /// it takes as known and the parameters that it finds. With logs it writes the model as a text (TOML), with start
+    /// values that are found from them: change it, and fit it with --grey.
     #[command(after_help = "\
 Examples:
   thetahat templates
   thetahat templates battery
-  thetahat templates battery log.csv --columns current=I,voltage=U > cell.toml")]
+  thetahat templates room log.csv --columns temperature=y,heater=u > room.toml")]
     Templates(Box<TemplatesArguments>),
     /// Fit a sample log of a DC motor, carried inside the program
     ///

@@ -2,6 +2,7 @@
 
 mod likelihood;
 mod objective;
+mod profile;
 mod uncertainty;
 
 use oorandom::Rand64;
@@ -24,6 +25,7 @@ use crate::respond::{
 };
 pub(crate) use likelihood::{Likelihood, LikelihoodObjective, Slopes};
 use objective::Deviance;
+pub(crate) use profile::intervals;
 pub(crate) use uncertainty::listed;
 
 /// How the parameters of a model in equations were found: those of the largest likelihood of its innovations.
@@ -38,6 +40,9 @@ pub struct EquationsOutcome {
     pub covariance_factor: f64,
     /// What was known of the parameters before the fit, in their order.
     pub unknown: Vec<UnknownParameter>,
+    /// The intervals of the parameters by profile likelihood, in their order, where they were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub profile: Vec<ProfileInterval>,
     /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each
     /// run; none where it grows out of range.
     pub starts: Vec<Vec<Option<f64>>>,
@@ -67,6 +72,17 @@ pub struct UnknownParameter {
     /// Its unit, if the model tells it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
+}
+
+/// The values of a parameter, of level 95 %, with which the likelihood is not significantly below its largest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProfileInterval {
+    /// The parameter's name.
+    pub name: String,
+    /// The lower end; none where the likelihood does not fall so far before the parameter's bound, or at all.
+    pub low: Option<f64>,
+    /// The upper end; none likewise.
+    pub high: Option<f64>,
 }
 
 /// How the search for the largest likelihood went.

@@ -14,8 +14,8 @@ use crate::Error;
 use crate::data::{Log, Rows, Source, Split};
 use crate::estimate::{
     Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, NullDistribution, Procedure,
-    Question,
-    equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
+    ProfileInterval, Question,
+    equations::{EquationsEstimate, intervals, largest_likelihood, largest_likelihood_of},
 };
 use crate::model::{EquationsModel, GreyBox};
 use crate::respond::{
@@ -42,6 +42,8 @@ pub struct EquationsPlan {
     pub search: Search,
     /// Whether searches from the start of the model alone are left at that, where it leads to no maximum.
     pub own_start_only: bool,
+    /// Whether intervals by profile likelihood are computed.
+    pub profile: bool,
 }
 
 impl EquationsPlan {
@@ -144,9 +146,14 @@ pub fn fit_equations(
     plan: &EquationsPlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    fit(model, log, sources, plan, |experiments| {
-        largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor)
-    })
+    fit(
+        model,
+        log,
+        sources,
+        plan,
+        |experiments| largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor),
+        monitor,
+    )
 }
 
 /// The same, but others compute the likelihood and its slopes for each point where the search stands: each holder has
@@ -169,18 +176,31 @@ pub fn fit_equations_distributed(
         let message = "all rows serve for the fit; cut the experiments, and validate the model on other ones";
         return Err(Error::argument("rows", message));
     }
+    if plan.profile {
+        return Err(Error::argument(
+            "profile",
+            "it needs the logs themselves, which others hold; leave it out",
+        ));
+    }
     if counts.iter().sum::<usize>() != log.logs().count() {
         return Err(Error::argument(
             "counts",
             "they are not those of the logs; count the logs of each holder",
         ));
     }
-    fit(model, log, sources, plan, |experiments| {
-        let holders = Holders::new(ask, counts.len());
-        let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
-        let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
-        holders.failure().map_or(found, Err)
-    })
+    fit(
+        model,
+        log,
+        sources,
+        plan,
+        |experiments| {
+            let holders = Holders::new(ask, counts.len());
+            let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
+            let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
+            holders.failure().map_or(found, Err)
+        },
+        monitor,
+    )
 }
 
 /// What the logs of one holder answer, see [`fit_equations_distributed`].
@@ -200,6 +220,7 @@ fn fit(
     sources: &[Source],
     plan: &EquationsPlan,
     search: impl FnOnce(&[Experiment]) -> Result<EquationsEstimate, Error>,
+    monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
     if model.parameters().is_empty() {
         return Err(Error::argument(
@@ -222,6 +243,13 @@ fn fit(
     let found = search(&fitted_to)?;
     let Errors { nis, mse, noise } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
+    let profile = if plan.profile {
+        let ends = intervals(model, &fitted_to, &found, factor, &plan.search, monitor)?;
+        let named = model.unknown().zip(ends);
+        named.map(|(name, [low, high])| ProfileInterval { name: name.to_owned(), low, high }).collect()
+    } else {
+        Vec::new()
+    };
     let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());
     let fitted = EquationsModel::new(model, &found.values, covariance.collect(), &noise);
 
@@ -242,6 +270,7 @@ fn fit(
             nis,
             covariance_factor: factor,
             unknown: unknown.collect(),
+            profile,
             starts: own.starts(),
             search: found.search,
         }),

@@ -59,17 +59,34 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &EquationsModel
 
 /// The parameters, and what was known of them before.
 fn parameters(outcome: &EquationsOutcome, model: &EquationsModel) -> Table {
-    let head = ["parameter", "value", "standard error", "unit", "start", "min", "max", "estimated as"];
-    let mut table = columns("Parameters", head).words(&[3, 7]).on_pages(&[5, 6]);
+    let head = [
+        "parameter",
+        "value",
+        "standard error",
+        "unit",
+        "95 % from",
+        "to",
+        "start",
+        "min",
+        "max",
+        "estimated as",
+    ];
+    let mut table = columns("Parameters", head)
+        .words(&[3, 9])
+        .on_pages(&[7, 8])
+        .without(if outcome.profile.is_empty() { &[4, 5] } else { &[] });
     if outcome.unknown.iter().all(|known| known.unit.is_none()) {
         table = table.without(&[3]);
     }
-    for (parameter, known) in model.parameters.iter().zip(&outcome.unknown) {
+    for (index, (parameter, known)) in model.parameters.iter().zip(&outcome.unknown).enumerate() {
+        let profile = outcome.profile.get(index);
         table.row([
             word(&parameter.name),
             figure(parameter.value, number),
             error(parameter.standard_error),
             word(harmless(known.unit.as_deref().unwrap_or_default())),
+            figure(profile.and_then(|profile| profile.low), number),
+            figure(profile.and_then(|profile| profile.high), number),
             figure(known.start, short),
             figure(known.min, short),
             figure(known.max, short),

@@ -14,8 +14,10 @@ use crate::validate::Test;
 
 /// Mean nis, relative to what is expected, outside of this range: the noises of the model are not those of the log.
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;
-/// Parameters whose correlation is beyond this one can hardly be told apart.
+/// Parameters whose correlation is beyond this one can hardly be told apart, if one of them has a standard error above
+/// this fraction of its value: else both are known well all the same.
 const ALIKE: f64 = 0.99;
+const BLURRED: f64 = 0.05;
 /// So many pairs of them are named.
 const MOST_ALIKE: usize = 3;
 /// Innovations are called coloured below this p-value.
@@ -74,7 +76,11 @@ pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &
     for (i, row) in model.covariance.iter().flatten().enumerate() {
         for (j, covariance) in row.iter().enumerate().take(i) {
             let correlation = covariance / (deviation(i) * deviation(j));
-            if correlation.abs() > ALIKE {
+            let is_blurred = |index: &usize| {
+                let value = model.parameters[*index].value;
+                deviation(*index) > BLURRED * value.abs()
+            };
+            if correlation.abs() > ALIKE && [j, i].iter().any(is_blurred) {
                 alike.push((correlation, [j, i]));
             }
         }

@@ -4,10 +4,11 @@
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::noise::Noise;
 
-use super::models::{experiment, fitted};
+use super::models::{experiment, fitted, fitted_with, joined};
 use crate::data::{Recording, Times};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::model::GreyBox;
+use crate::report::{EquationsPlan, ValidationPlan, compare, validate};
 use crate::tests::channel;
 
 /// A room with a wall (Madsen and Holst 1995; RC network of two states), in hours, K, kW.
@@ -225,17 +226,102 @@ measurement = { y = { start = 10, unknown = true } }
 /// the first year only says where.
 #[test]
 fn the_variances_of_the_nile_are_those_of_the_book() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/public/nile.csv");
-    let log = std::fs::read_to_string(path).unwrap();
-    let y: Vec<f64> =
-        log.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
-    let recording = Recording { channels: vec![channel("y", y)], times: Times::Uniform(1.0) };
-    let found = fitted(&GreyBox::from_toml(NILE).unwrap(), &[recording]).unwrap();
+    let found = fitted(&GreyBox::from_toml(NILE).unwrap(), &[nile()]).unwrap();
     let variances = [found.parameter(0).0, found.parameter(1).0].map(|deviation| deviation * deviation);
     assert!((variances[0] - 1469.1).abs() < 0.5, "{variances:?}");
     assert!((variances[1] - 15098.5).abs() < 1.0, "{variances:?}");
     let first = -0.5 * (std::f64::consts::TAU * 1e12_f64).ln();
     assert!((found.outcome.log_likelihood - first + 632.54).abs() < 0.01, "{}", found.outcome.log_likelihood);
+}
+
+fn nile() -> Recording {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/public/nile.csv");
+    let log = std::fs::read_to_string(path).unwrap();
+    let y: Vec<f64> =
+        log.lines().skip(1).map(|line| line.split(',').nth(1).unwrap().parse().unwrap()).collect();
+    Recording { channels: vec![channel("y", y)], times: Times::Uniform(1.0) }
+}
+
+#[test]
+fn the_ends_of_a_profile_are_where_the_likelihood_has_fallen() {
+    let model = GreyBox::from_toml(NILE).unwrap();
+    let plan = EquationsPlan { profile: true, ..EquationsPlan::default() };
+    let found = fitted_with(&model, &[nile()], &plan).unwrap();
+    let experiments = [experiment(&model, &nile())];
+    let mut criterion = LikelihoodObjective::new(&model, &experiments);
+    for (index, interval) in found.outcome.profile.iter().enumerate() {
+        let (value, error) = found.parameter(index);
+        let [low, high] = [interval.low.unwrap(), interval.high.unwrap()];
+        assert!(low < value && value < high);
+        // Of a standard deviation it is not symmetric, and reaches further up.
+        assert!(high - value > value - low, "{} {value} {low} {high}", interval.name);
+        assert!((high - low) / (2.0 * 1.96 * error) > 0.9 && (high - low) / (2.0 * 1.96 * error) < 1.6);
+        for end in [low, high] {
+            // The best other one, by bisection of a grid.
+            let (mut least, mut from, mut to) = (f64::INFINITY, 1.0_f64.ln(), 400.0_f64.ln());
+            for _ in 0..12 {
+                let step = (to - from) / 20.0;
+                let mut best = from;
+                for place in 0..=20 {
+                    let other = from + f64::from(place) * step;
+                    let z = if index == 0 { [end.ln(), other] } else { [other, end.ln()] };
+                    let cost = criterion.evaluate(&z).unwrap();
+                    if cost < least {
+                        (least, best) = (cost, other);
+                    }
+                }
+                (from, to) = (best - step, best + step);
+            }
+            let fall = 2.0 * (found.outcome.log_likelihood + least);
+            assert!((fall - 3.841459).abs() < 2e-3, "{} {end}: {fall}", interval.name);
+        }
+    }
+}
+
+/// The Nile has no flow of its own: a noise that the log shows no sign of.
+#[test]
+fn a_noise_that_is_not_there_vanishes_and_has_an_upper_end() {
+    let text = NILE.replace("'level'\n[outputs]", "'0.5 * level'\n[outputs]").replace("sd = 1e6", "sd = 1");
+    let model = GreyBox::from_toml(&text).unwrap();
+    // Errors that follow one another with turned signs are the opposite of what such a noise does.
+    let mut random = Noise(2);
+    let (mut level, mut before) = (1000.0, 0.0);
+    let y: Vec<f64> = (0..200)
+        .map(|_| {
+            let error = random.normal();
+            let seen = level + 3.0 * (error - 0.4 * before);
+            (level, before) = (0.5 * level, error);
+            seen
+        })
+        .collect();
+    let recording = Recording { channels: vec![channel("y", y)], times: Times::Uniform(1.0) };
+    let plan = EquationsPlan { profile: true, ..EquationsPlan::default() };
+    let found = fitted_with(&model, std::slice::from_ref(&recording), &plan).unwrap();
+    let own = &found.model.parameters[0];
+    assert_eq!((own.value, own.standard_error), (0.0, None));
+    let profile = &found.outcome.profile[0];
+    assert!(profile.low.is_none() && profile.high.unwrap() > 0.1 && profile.high.unwrap() < 3.0);
+    let said: Vec<&String> = found
+        .report
+        .warnings
+        .iter()
+        .filter(|warning| warning.contains("no sign of 'process.level'"))
+        .collect();
+    assert_eq!(said.len(), 1, "{:?}", found.report.warnings);
+    // What was found is a model like any other, without that noise.
+    assert_eq!(found.model.with_values().unwrap().unknown().len(), 0);
+
+    // And the further parameter says nothing.
+    let without = text.replace("level = { start = 10, unknown = true } }", "level = 0 }");
+    let small = fitted(&GreyBox::from_toml(&without).unwrap(), std::slice::from_ref(&recording)).unwrap();
+    let log = joined(&[recording]).unwrap();
+    let validated = [&small.report, &found.report]
+        .map(|report| validate(report, None, &log, &[], &ValidationPlan::default()).unwrap());
+    let ratios = compare(&validated).unwrap().likelihood_ratios;
+    assert_eq!(ratios.len(), 1);
+    assert_eq!((ratios[0].smaller, ratios[0].larger), (0, 1));
+    assert_eq!(ratios[0].parameters, ["process.level"]);
+    assert!(ratios[0].ratio < 1e-5 && ratios[0].p_value > 0.99);
 }
 
 /// Measurements that are as noisy as what they measure is large, and a noise that an input brings.

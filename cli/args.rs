@@ -92,7 +92,7 @@ Examples:
   thetahat fit monday.csv tuesday.csv --model oe --nb 2 --nf 2 --report model.json
   thetahat fit sunspots.csv -y count --model arma --na 2 --nc 1
   thetahat fit --grey spring.toml log.csv --report spring.json
-  thetahat fit --grey template:room log.csv --columns temperature=y,heater=u --known process.temperature=0
+  thetahat fit --grey template:room log.csv --columns temperature=y,heater=u
   thetahat fit log.csv --na 2 --nb 2 --norm 1 --bound a1=-1.9..0 --dc-gain 1..20
   thetahat fit log.csv --model oe --nb 2 --nf 2 --norm huber")]
     Fit(Box<FitArguments>),

@@ -26,8 +26,8 @@ pub(crate) struct FitArguments {
     #[command(flatten)]
     pub(crate) options: OptionArguments<FitOptions>,
     /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by
-    /// name, the clock may be irregular. template:NAME is a plant that is ready, with start values from the log: thetahat
-    /// templates lists them
+    /// name, the clock may be irregular. template:NAME is a plant that is ready, with start values from the log:
+    /// thetahat templates lists them
     #[arg(long, value_name = "MODEL", help_heading = "Model", conflicts_with = "from")]
     pub(crate) grey: Option<PathBuf>,
     #[command(flatten)]

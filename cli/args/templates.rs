@@ -12,8 +12,9 @@ pub(crate) struct TemplateOptionArguments {
     /// Which column is which, of a template: ROLE=COLUMN, such as current=I_batt,voltage=U [default: by their names]
     #[arg(long, value_name = "ROLE=COLUMN", help_heading = "Model")]
     pub(crate) columns: Vec<Names>,
-    /// What is known of parameters, and of the numbers that a template takes as known: NAME=VALUE, such as capacity=33.4
-    #[arg(long, value_name = "NAME=VALUE", help_heading = "Model", allow_hyphen_values = true)]
+    /// What is known of parameters, and of the numbers that a template takes as known: NAME=VALUE, such as
+    /// capacity=33.4
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Model")]
     pub(crate) known: Vec<Names>,
 }
 

@@ -89,8 +89,8 @@ fn arm() -> String {
     mechanism("angle", 23, |angle| 0.6 * (angle + 0.1).cos())
 }
 
-/// A cell of 2.5 Ah that starts full, with r0 = 20 mOhm, and pairs of 10 mOhm and 25 s and, if there are two, of 15 mOhm
-/// and 250 s; the current is above 0 in discharge.
+/// A cell of 2.5 Ah that starts full, with r0 = 20 mOhm, and pairs of 10 mOhm and 25 s and, if there are two, of 15
+/// mOhm and 250 s; the current is above 0 in discharge.
 fn battery(pairs: usize) -> String {
     let mut random = Random(31);
     let (mut soc, mut lags, mut current) = (1.0_f64, [0.0; 2], 0.0);

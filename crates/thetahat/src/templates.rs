@@ -5,9 +5,9 @@
 //! numbers from which a fit starts, and the figures that people of that trade ask for. What comes out is an ordinary
 //! model: its text can be written out and changed.
 //!
-//! **Start values.** The equations are linear in the parameters, or in combinations of them, if the states are measured:
-//! least squares on modulated signals finds them for windows of several lengths ([`modulated`]), or a grid of time
-//! constants with least squares for the rest. Each candidate goes through the filter once; the one of the largest
+//! **Start values.** The equations are linear in the parameters, or in combinations of them, if the states are
+//! measured: least squares on modulated signals finds them for windows of several lengths ([`modulated`]), or a grid of
+//! time constants with least squares for the rest. Each candidate goes through the filter once; the one of the largest
 //! likelihood is where the fit starts. All of that is deterministic.
 //!
 //! ```
@@ -139,8 +139,8 @@ impl Template {
         })
     }
 
-    /// Which columns of a log are which: those given as (name of the template, name in the log), and the others by their
-    /// names, without regard to case and units.
+    /// Which columns of a log are which: those given as (name of the template, name in the log), and the others by
+    /// their names, without regard to case and units.
     ///
     /// # Errors
     /// [`Error::Argument`] if a wanted column is not there, or several could be it, with those that are wanted.

@@ -112,9 +112,9 @@ use crate::Error;
 /// min)/(1 + exp(-z)), with z free. `walk` is the standard deviation by which such a parameter drifts each
 /// `sample_time`.
 ///
-/// **Figures.** `[figures]` has expressions of parameters, and of figures above, which a fit reports with their standard
-/// errors: `time_constant = "capacity / loss"`, or with a unit `{ value = "capacity / loss", unit = "s" }`. Those whose
-/// names begin with `_` only serve others. A parameter may have a `unit` too.
+/// **Figures.** `[figures]` has expressions of parameters, and of figures above, which a fit reports with their
+/// standard errors: `time_constant = "capacity / loss"`, or with a unit `{ value = "capacity / loss", unit = "s" }`.
+/// Those whose names begin with `_` only serve others. A parameter may have a `unit` too.
 ///
 /// All equations are compiled once into one list of operations in which nothing is computed twice, together with all
 /// partial derivatives, found by the rules of calculus. Nothing is approximated by differences.

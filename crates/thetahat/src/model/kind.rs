@@ -26,7 +26,7 @@ pub enum Model {
     /// A(q) y = B(q)/F(q) u + C(q)/D(q) e.
     Polynomial(Box<PolynomialModel>),
     /// Equations of the states and the outputs, written by hand.
-    Equations(EquationsModel),
+    Equations(Box<EquationsModel>),
     /// y = g(past outputs and inputs) + e.
     NonlinearArx(Box<NonlinearArxModel>),
     /// Gain, lags and dead time in continuous time.
@@ -79,7 +79,7 @@ impl From<PolynomialModel> for Model {
 
 impl From<EquationsModel> for Model {
     fn from(model: EquationsModel) -> Self {
-        Self::Equations(model)
+        Self::Equations(Box::new(model))
     }
 }
 

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! With the time constants T_j given, the voltage is linear in all the rest: in the values of the table of the
-//! open-circuit voltage at its knots, in R0, and in R_j by the current through a first-order lag. The starting procedure
-//! tries time constants on a grid, and as many knots as Schwarz's criterion is for.
+//! open-circuit voltage at its knots, in R0, and in R_j by the current through a first-order lag. The starting
+//! procedure tries time constants on a grid, and as many knots as Schwarz's criterion is for.
 //!
 //! Source: Plett, Battery Management Systems I, 2015, sections 2.3 to 2.10.
 

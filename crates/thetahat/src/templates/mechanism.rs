@@ -6,8 +6,8 @@
 //! V = kS sign(v) + kV v + kA a + kG cos(angle + offset)      an arm
 //! ```
 //!
-//! From row to row the voltage is held, so that the step of the velocity is exact, and friction that stops the mechanism
-//! holds it: with E = exp(-dt kV/kA) and B = (1 - E)/kV,
+//! From row to row the voltage is held, so that the step of the velocity is exact, and friction that stops the
+//! mechanism holds it: with E = exp(-dt kV/kA) and B = (1 - E)/kV,
 //!
 //! ```text
 //! v(k+1) = D(E v + B (V - kG)),    D(x) = x - B kS above B kS, x + B kS below -B kS, else 0
@@ -15,16 +15,17 @@
 //! ```
 //!
 //! The logs are those of quasistatic runs, in which a voltage rises slowly, and of dynamic ones, in which it steps: the
-//! first tell kS and kV, the second kA. The figures are gains of feedback that is optimal by a linear-quadratic measure,
-//! sampled each `period` (WPILib, SysId, FeedbackAnalysis.cpp): with x' = A x + B u sampled as x(k+1) = Ad x + Bd u,
+//! first tell kS and kV, the second kA. The figures are gains of feedback that is optimal by a linear-quadratic
+//! measure, sampled each `period` (WPILib, SysId, FeedbackAnalysis.cpp): with x' = A x + B u sampled as x(k+1) = Ad x +
+//! Bd u,
 //!
 //! ```text
 //! J = sum x' Q x + R u^2,    Q = diag(1/position_error^2, 1/velocity_error^2),    R = 1/effort^2
 //! ```
 //!
 //! The gains come from the closed loop's polynomial, by spectral factorisation (Åström and Wittenmark,
-//! Computer-Controlled Systems, 3rd ed. 1997, section 11.4): with d(z) = (z - 1)(z - ad), n1 and n2 the polynomials from
-//! u to position and velocity,
+//! Computer-Controlled Systems, 3rd ed. 1997, section 11.4): with d(z) = (z - 1)(z - ad), n1 and n2 the polynomials
+//! from u to position and velocity,
 //!
 //! ```text
 //! R d(z) d(1/z) + n1(z) n1(1/z)/position_error^2 + n2(z) n2(1/z)/velocity_error^2 = s^2 P(z) P(1/z)

@@ -7,8 +7,8 @@
 //! d^m y/dt^m = sum_i theta_i d^(d_i) s_i/dt^(d_i)
 //! ```
 //!
-//! is multiplied by a function g that vanishes with its first two derivatives at the ends of a window, and integrated by
-//! parts over it, so that the derivatives are those of g, which are known:
+//! is multiplied by a function g that vanishes with its first two derivatives at the ends of a window, and integrated
+//! by parts over it, so that the derivatives are those of g, which are known:
 //!
 //! ```text
 //! (-1)^m int g^(m) y dt = sum_i theta_i (-1)^(d_i) int g^(d_i) s_i dt,    g(s) = s^3 (1 - s)^3,  0 <= s <= 1

@@ -123,8 +123,8 @@ fn written(task: &Task<'_>, [length, damping, zero]: [f64; 3], inertia: Option<f
     }
 }
 
-/// The states of something that swings at a frequency, of which a position is measured: where it is and how fast, at the
-/// first row.
+/// The states of something that swings at a frequency, of which a position is measured: where it is and how fast, at
+/// the first row.
 pub(super) fn oscillation(
     task: &Task<'_>,
     column: usize,

@@ -56,8 +56,8 @@ fn found(report: &Report) -> (BTreeMap<String, (f64, f64, Option<f64>)>, &Equati
     (parameters.chain(figures).collect(), model)
 }
 
-/// The truth lies within 3.5 standard errors, and a start within this part of it; with which numbers known, and what the
-/// plants of the program are.
+/// The truth lies within 3.5 standard errors, and a start within this part of it; with which numbers known, and what
+/// the plants of the program are.
 #[track_caller]
 fn recovers(name: &str, csv: &str, known: &[(&str, f64)], near: f64, truth: &[(&str, f64)]) {
     let log = log(csv);
@@ -257,8 +257,8 @@ impl Random {
     }
 }
 
-/// Plants whose parameters are up to twice as large or small as those of a log, driven by its inputs: the template finds
-/// them from its own start values.
+/// Plants whose parameters are up to twice as large or small as those of a log, driven by its inputs: the template
+/// finds them from its own start values.
 #[track_caller]
 fn drawn(name: &str, csv: &str, known: &[(&str, f64)], count: u64) {
     let log = log(csv);

@@ -17,7 +17,8 @@
 //! | state of a model | |
 //! |---|---|
 //! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
-//! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`]; [`Augmented`] makes unknown parameters states |
+//! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`], iterated or not; [`Augmented`] makes unknown parameters states |
+//! | [`UnscentedKalmanFilter`] | the same without Jacobians, from values of the functions at points |
 //! | [`OutOfSequenceFilter`] | either of the two, where measurements come late; a [`FilterHistory`] of them |
 //! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
 //! | [`GainSchedule`] | gains and covariances ahead of the data |
@@ -113,6 +114,7 @@
 extern crate alloc;
 
 mod armax;
+mod around;
 mod arx;
 mod augmented;
 mod basis;
@@ -154,6 +156,7 @@ mod state_space;
 mod textbook;
 mod triangle;
 mod ud;
+mod unscented;
 mod vector_arx;
 mod windowed;
 
@@ -200,5 +203,6 @@ pub use smoother::{Smoothed, Smoother};
 pub use snapshot::SnapshotVersion;
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};
+pub use unscented::UnscentedKalmanFilter;
 pub use vector_arx::RecursiveVectorArx;
 pub use windowed::{Window, WindowedLeastSquares};

@@ -19,6 +19,7 @@
 //! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
 //! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`], iterated or not; [`Augmented`] makes unknown parameters states |
 //! | [`UnscentedKalmanFilter`] | the same without Jacobians, from values of the functions at points |
+//! | [`ZonotopeFilter`] | noise that is known by its bound alone: a set in which the state is for certain |
 //! | [`OutOfSequenceFilter`] | either of the two, where measurements come late; a [`FilterHistory`] of them |
 //! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
 //! | [`GainSchedule`] | gains and covariances ahead of the data |
@@ -159,6 +160,7 @@ mod ud;
 mod unscented;
 mod vector_arx;
 mod windowed;
+mod zonotope;
 
 pub use nalgebra;
 
@@ -206,3 +208,4 @@ pub use state_space::{LinearObservation, LinearTransition, Observation, Transiti
 pub use unscented::UnscentedKalmanFilter;
 pub use vector_arx::RecursiveVectorArx;
 pub use windowed::{Window, WindowedLeastSquares};
+pub use zonotope::{SetInnovation, ZonotopeFilter};

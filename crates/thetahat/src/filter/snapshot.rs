@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::DVector;
 
 use super::StateFilter;
 use super::estimator::Engine;
-use super::kind::{Filter, Observer, Sample};
+use super::kind::{Filter, Observer, Sample, Unscented};
 use super::row::{Row, Told};
 use super::totals::Totals;
 use crate::Error;
@@ -28,6 +28,7 @@ pub struct FilterSnapshot {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 enum EngineSnapshot {
     Filter(Filter),
+    Unscented(Unscented),
     Observer(Observer),
 }
 
@@ -59,6 +60,7 @@ impl StateFilter {
             origin: self.origin,
             engine: match &self.engine {
                 Engine::Filter(filter) => EngineSnapshot::Filter(filter.clone()),
+                Engine::Unscented(filter) => EngineSnapshot::Unscented(filter.clone()),
                 Engine::Observer { observer, .. } => EngineSnapshot::Observer(observer.clone()),
             },
             previous: self.previous.as_ref().map(|Sample { time, inputs, outputs }| SampleSnapshot {
@@ -88,6 +90,7 @@ impl StateFilter {
         let has_size = |sample: &Sample| (sample.inputs.len(), sample.outputs.len()) == (inputs, outputs);
         let fits = match (&engine, &self.engine) {
             (EngineSnapshot::Filter(filter), Engine::Filter(_)) => filter.state().len() == states,
+            (EngineSnapshot::Unscented(filter), Engine::Unscented(_)) => filter.state().len() == states,
             (EngineSnapshot::Observer(observer), Engine::Observer { .. }) => {
                 observer.state().len() == states && observer.gain().ncols() == outputs
             }
@@ -104,6 +107,7 @@ impl StateFilter {
         }
         match (engine, &mut self.engine) {
             (EngineSnapshot::Filter(kept), Engine::Filter(filter)) => *filter = kept,
+            (EngineSnapshot::Unscented(kept), Engine::Unscented(filter)) => *filter = kept,
             (EngineSnapshot::Observer(kept), Engine::Observer { observer, .. }) => *observer = kept,
             // Seen above.
             _ => {}

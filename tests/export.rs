@@ -448,10 +448,29 @@ fn observers_hold_the_innovations_of_filter() {
     folder.write("motor.csv", include_str!("data/dc_motor.csv"));
     folder.write("spring.csv", include_str!("data/mass_spring_damper.csv"));
     folder.write("spring.toml", include_str!("data/mass_spring_damper.toml"));
+    // Linear equations have an exact step. Those of the others are integrated, with noises that are not always the same,
+    // and inputs that act later, or go in lines.
+    let motor = include_str!("data/dc_motor.toml");
+    let line = motor.replace("voltage = \"u\"", "voltage = { channel = \"u\", hold = \"linear\" }");
+    let noisy = |text: &str| {
+        text.replace("friction * speed)", "friction * speed - 1e-9 * speed^3)")
+            .replace("speed = 0.2 }", "speed = \"0.1 + 0.01 * voltage^2\" }")
+            .replace("speed = 0.3 }", "speed = \"0.2 + 1e-5 * speed^2\" }")
+    };
+    folder.write("motor.toml", motor);
+    folder.write("line.toml", &line);
+    folder.write("bent_line.toml", noisy(&line));
+    folder.write("late.toml", motor.replace("(voltage -", "(voltage(t - 0.013) -"));
+    folder.write("bent_late.toml", noisy(motor).replace("(voltage -", "(voltage(t - 0.02) -"));
     for (log, fit, channels, initial) in [
         ("motor.csv", "-u u -y i,speed --order 2", &["u", "i", "speed"][..], "--initial zero"),
         ("motor.csv", "-u u -y speed --model ss --order 2", &["u", "speed"], "--initial zero"),
         ("spring.csv", "--grey spring.toml", &["force", "position"], ""),
+        ("motor.csv", "--grey motor.toml", &["u", "i", "speed"], ""),
+        ("motor.csv", "--grey line.toml", &["u", "i", "speed"], ""),
+        ("motor.csv", "--grey bent_line.toml", &["u", "i", "speed"], ""),
+        ("motor.csv", "--grey late.toml", &["u", "i", "speed"], ""),
+        ("motor.csv", "--grey bent_late.toml", &["u", "i", "speed"], ""),
     ] {
         folder.done(&format!("fit {log} --time t {fit} --report r.json"));
         let filtered = folder.done(&format!("filter r.json {log} --time t {initial}")).stdout;

@@ -16,6 +16,7 @@ import pytest
 
 import thetahat as th
 from thetahat import plot
+from thetahat.fits.expressions import Expression
 
 DATA = Path(__file__).parents[2] / "tests" / "data"
 TANK: dict[str, Any] = {
@@ -571,3 +572,44 @@ def test_starts_ten_times_off_find_the_plant(plant: Any, seed: int, factors: Seq
     known = th.grey(log, model([1.0] * len(truth)))
     np.testing.assert_allclose(found.parameters, known.parameters, rtol=1e-3)
     np.testing.assert_allclose(found.parameters, truth, rtol=0.05)
+
+
+def test_noises_starts_holds_and_delays_of_functions() -> None:
+    rng = np.random.default_rng(5)
+    outside = 5 + 4 * np.sin(np.arange(900) / 40)
+    heating = np.repeat(rng.normal(2, 1, 90), 10)
+    room, y = 19.0, np.zeros(900)
+    for row in range(900):
+        y[row] = room + 0.05 * rng.standard_normal()
+        rise = outside[min(row + 1, 899)] - outside[row]
+        late = heating[max(row - 3, 0)]
+        kept = np.exp(-0.5 / 4)
+        towards = outside[row] + 8 * late
+        room = towards + rise * (1 - 4 * (1 - kept) / 0.5) + (room - towards) * kept + 0.1 * rng.standard_normal()
+    log = th.Log({"to": outside, "q": heating, "y": y}, sample_time=0.5)
+    box = th.GreyBox.from_functions(
+        sample_time=0.5,
+        states={"room": ("first", 0.1)},
+        inputs={"outside": {"channel": "to", "hold": "linear"}, "heating": "q"},
+        parameters={
+            "first": {"start": 20, "sd": 5, "unknown": True},
+            "delay": {"start": 0.6, "sd": 1, "unknown": True, "min": 0, "max": 5},
+            "tau": {"start": 8, "sd": 8, "unknown": True, "min": 0},
+            "moved": {"start": 0.3, "sd": 0.3, "unknown": True, "min": 0},
+        },
+        derivative=lambda x, u, p: {"room": (u.outside + 8 * th.delayed(u.heating, p.delay) - x.room) / p.tau},
+        outputs=lambda x, u, p: {"y": x.room},
+        process=lambda x, u, p: {"room": p.moved},
+        measurement={"y": {"start": 0.2, "unknown": True}},
+    )
+    assert box.unknown == ["first", "delay", "tau", "moved", "measurement.y"]
+    with pytest.raises(TypeError, match="expected an input, such as u.flow"):
+        th.delayed(2 * Expression("a"), 1)
+    model = th.grey(log, box, profile=True)
+    for value, error, truth in zip(model.parameters, model.standard_errors, [19, 1.5, 4, 0.1, 0.05]):
+        assert abs(value - truth) < 4 * error
+    intervals = {own["name"]: (own["low"], own["high"]) for own in json.loads(model.to_json())["estimation"]["profile"]}
+    for name, value in zip(box.unknown, model.parameters):
+        assert intervals[name][0] < value < intervals[name][1]
+    # A filter takes the noises as they start.
+    assert th.StateModel.from_toml(box.to_toml()).unknown == ["first", "delay", "tau"]

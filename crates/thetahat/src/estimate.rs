@@ -12,7 +12,7 @@
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
-//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`], [`SubspaceOutcome`] (with a
+//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`] (with [`ProfileInterval`]s), [`SubspaceOutcome`] (with a
 //!   [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`] (of
 //!   [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or
 //!   [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
@@ -88,7 +88,7 @@ pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};
 pub use distributed::{Answer, Ask, Question};
 pub(crate) use distributed::{Distributed, DistributedLikelihood, Holders};
-pub use equations::{EquationsOutcome, LikelihoodSearch, UnknownParameter};
+pub use equations::{EquationsOutcome, LikelihoodSearch, ProfileInterval, UnknownParameter};
 pub use exact::LikelihoodOutcome;
 pub(crate) use experiment_data::ExperimentData;
 pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};

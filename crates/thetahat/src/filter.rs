@@ -37,6 +37,7 @@ mod linear;
 mod linearization;
 mod matrices;
 mod model;
+mod past;
 mod row;
 mod smooth;
 mod snapshot;

@@ -351,7 +351,8 @@ fn equations(options: &FitOptions) -> Result<EquationsPlan, Error> {
     let Common { estimate, validate, split, .. } = common(options)?;
     // Where no number is given there are more if they are needed.
     let own_start_only = options.starts == Some(0);
-    Ok(EquationsPlan { estimate, validate, split, search: search::search(options)?, own_start_only })
+    let search = search::search(options)?;
+    Ok(EquationsPlan { estimate, validate, split, search, own_start_only, profile: options.profile })
 }
 
 impl Draft for EquationsPlan {

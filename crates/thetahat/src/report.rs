@@ -91,6 +91,6 @@ pub use schema::{Data, Estimation, Missing, Parts, Report};
 pub use state_space::{StateSpacePlan, fit_state_space, fit_state_space_monitored};
 pub(crate) use suited::{SAME_TIME, check_sample_time};
 pub use validation::{
-    Comparison, Coverage, InSample, NoiseLevel, Offsets, OutputSignals, Signals, Validated, Validation,
-    ValidationOptions, ValidationPlan, compare, validate,
+    Comparison, Coverage, InSample, LikelihoodRatio, NoiseLevel, Offsets, OutputSignals, Signals, Validated,
+    Validation, ValidationOptions, ValidationPlan, compare, validate,
 };

@@ -11,7 +11,7 @@ Fits            `fit` takes the model that the data ask for, `search` chooses am
   polynomials   `arx`, `armax`, `oe`, `bj`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
   time series   `arima` with differences and seasons, `ar`, `arma`.
   others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations,
-                with `table` and `where`.
+                with `table`, `where` and `delayed`.
 Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
                 `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
                 `compare` lays several side by side.
@@ -86,7 +86,7 @@ from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
 from thetahat.fits.arima import arima
 from thetahat.fits.comparison import Comparison, compare
-from thetahat.fits.expressions import table, where
+from thetahat.fits.expressions import delayed, table, where
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
 from thetahat.fits.grey_box import GreyBox, grey
 from thetahat.fits.instrumental import iv, sriv
@@ -191,6 +191,7 @@ __all__ = [
     "closed_loop",
     "compare",
     "dc_motor",
+    "delayed",
     "design",
     "fir",
     "fit",

@@ -2,6 +2,7 @@
 
 mod likelihood;
 mod objective;
+mod profile;
 mod uncertainty;
 
 use oorandom::Rand64;
@@ -24,6 +25,7 @@ use crate::respond::{
 };
 pub(crate) use likelihood::{Likelihood, LikelihoodObjective, Slopes};
 use objective::Deviance;
+pub(crate) use profile::intervals;
 pub(crate) use uncertainty::listed;
 
 /// How the parameters of a model in equations were found: those of the largest likelihood of its innovations.
@@ -38,6 +40,9 @@ pub struct EquationsOutcome {
     pub covariance_factor: f64,
     /// What was known of the parameters before the fit, in their order.
     pub unknown: Vec<UnknownParameter>,
+    /// The intervals of the parameters by profile likelihood, in their order, where they were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub profile: Vec<ProfileInterval>,
     /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each
     /// run; none where it grows out of range.
     pub starts: Vec<Vec<Option<f64>>>,
@@ -64,6 +69,17 @@ pub struct UnknownParameter {
     /// The standard error of the estimate if the noises of the model are those of the log: not multiplied by the
     /// covariance factor.
     pub nominal_standard_error: f64,
+}
+
+/// The values of a parameter, of level 95 %, with which the likelihood is not significantly below its largest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ProfileInterval {
+    /// The parameter's name.
+    pub name: String,
+    /// The lower end; none where the likelihood does not fall so far before the parameter's bound, or at all.
+    pub low: Option<f64>,
+    /// The upper end; none likewise.
+    pub high: Option<f64>,
 }
 
 /// How the search for the largest likelihood went.
@@ -103,6 +119,9 @@ const FACTOR: f64 = 30.0;
 /// Errors that are four times as large as the noises of the model say may be those of a maximum far below the
 /// largest.
 const HOPELESS: f64 = 16.0;
+
+/// A noise without which the logarithm of the likelihood falls by no more than this is none.
+const VANISHING: f64 = 1e-6;
 
 /// What was found.
 #[derive(Debug, Clone)]
@@ -254,12 +273,14 @@ fn estimate_of(
     let best = lowest(searched.iter().map(|found| found.as_ref().ok())).unwrap_or(0);
     let best =
         searched.into_iter().nth(best).ok_or_else(|| Error::data("there is no start to search from"))?;
-    let found = best.map_err(|failure| failure.error(experiments))?;
+    let mut found = best.map_err(|failure| failure.error(experiments))?;
 
+    let vanishing = without_noises(unknown, &mut found.parameters, criterion);
     criterion.linearize(&found.parameters).map_err(|failure| failure.error(experiments))?;
     let slopes: Vec<f64> =
         unknown.iter().zip(&found.parameters).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
-    let (covariance, condition) = uncertainty::covariance(&criterion.slopes().information, &slopes, &names)?;
+    let information = &criterion.slopes().information;
+    let (covariance, condition) = uncertainty::covariance(information, &slopes, &names, &vanishing)?;
     uncertainty::check(unknown, &found.parameters, &covariance)?;
     Ok(EquationsEstimate {
         values: unknown.iter().zip(&found.parameters).map(|(unknown, &z)| unknown.inside(z)).collect(),
@@ -282,6 +303,27 @@ fn estimate_of(
     })
 }
 
+/// Noises that are drawn to their lower bound go there, if the likelihood does not fall by it: the search only comes near.
+/// Which of them did.
+fn without_noises(unknown: &[Unknown], z: &mut [f64], criterion: &mut impl Likelihood) -> Vec<bool> {
+    let mut vanishing = vec![false; z.len()];
+    let Ok(value) = criterion.evaluate(z) else { return vanishing };
+    for (index, unknown) in unknown.iter().enumerate() {
+        let has_bound = matches!(unknown.scale, Scale::Above(_) | Scale::Between(..));
+        if !(unknown.of_noise && has_bound) {
+            continue;
+        }
+        let found = std::mem::replace(&mut z[index], f64::NEG_INFINITY);
+        let falls = criterion.evaluate(z).map_or(f64::INFINITY, |without| without - value);
+        // Not for NaN either.
+        vanishing[index] = falls <= VANISHING;
+        if !vanishing[index] {
+            z[index] = found;
+        }
+    }
+    vanishing
+}
+
 /// The start that the model says, and random ones.
 fn starts(unknown: &[Unknown], options: &Search) -> Vec<Vec<f64>> {
     let mut random = Rand64::new(u128::from(options.seed));
@@ -298,10 +340,14 @@ fn starts(unknown: &[Unknown], options: &Search) -> Vec<Vec<f64>> {
 }
 
 impl Unknown {
-    /// The value of a variable. What rounds to a bound is the number next to it: bounds are not reached.
+    /// The value of a variable. What rounds to a bound is the number next to it: none but a noise that vanishes reaches
+    /// its bound.
     fn inside(&self, z: f64) -> f64 {
         let (min, max) = self.bounds();
         let mut value = self.scale.value(z);
+        if z == f64::NEG_INFINITY {
+            return value;
+        }
         value = min.map_or(value, |min| value.max(min.next_up()));
         max.map_or(value, |max| value.min(max.next_down()))
     }

@@ -4,17 +4,17 @@
 //! y(k) = h(x(k), u(k), t),   x(k+1) = f(x(k), u(k), t, dt)      or dx/dt = f, in steps of the classical method of order four (Kutta 1901)
 //! ```
 //!
-//! with the operations that the equations were compiled into. Predictors and observers correct the state by an extended
+//! or in the exact step of linear equations, with the operations that the equations were compiled into. Predictors and observers correct the state by an extended
 //! Kalman filter.
 
 mod kalman;
 mod translation;
 
-use super::program::{Array, Counter, Entry, Index, Program, Statement, Value};
+use super::program::{Array, Condition, Counter, Entry, Index, Program, Statement, Value};
 use super::signals::{FREE_RUN, Signals};
 use super::{Form, Purpose, refused};
 use crate::Error;
-use crate::model::equations::{GreyBox, Operation, Program as Compiled};
+use crate::model::equations::{GreyBox, Operation, Program as Compiled, Step};
 use crate::model::{EquationsModel, Model};
 use kalman::Kalman;
 use translation::{Leaves, translated};
@@ -44,31 +44,37 @@ pub(super) fn form(whole: &Model, model: &EquationsModel, purpose: Purpose) -> R
             }
         }
     };
-    let steps = equations.compiled().1;
+    let step = equations.compiled().1;
     let each =
         model.parameters.iter().map(|own| format!("{} = {}", crate::text::harmless(&own.name), own.value));
-    let mut lines = vec![model_name(model, steps), "The equations are:".to_owned()];
+    let mut lines = vec![model_name(model, step), "The equations are:".to_owned()];
     lines.extend(model.equations.lines().map(|line| format!("    {}", crate::text::harmless(line))));
     lines.extend(["with:".to_owned()].into_iter().chain(each));
     Ok(Form { program, equations: lines, start: "in the state that the equations begin in".to_owned() })
 }
 
-fn model_name(model: &EquationsModel, steps: Option<usize>) -> String {
+fn model_name(model: &EquationsModel, step: Step) -> String {
     let count = model.states.len();
-    let how = match steps {
-        None => "of the next state".to_owned(),
-        Some(1) => "of derivatives, one step of Runge and Kutta in a sample".to_owned(),
-        Some(steps) => format!("of derivatives, {steps} steps of Runge and Kutta in a sample"),
+    let how = match step {
+        Step::Next => "of the next state".to_owned(),
+        Step::Exact(_) => "of derivatives, which are linear: an exact step in a sample".to_owned(),
+        Step::Integrated(1) => "of derivatives, one step of Runge and Kutta in a sample".to_owned(),
+        Step::Integrated(steps) => format!("of derivatives, {steps} steps of Runge and Kutta in a sample"),
     };
     format!("Equations of {count} state{}, {how}.", if count == 1 { "" } else { "s" })
 }
 
 /// The state, and what leads it from one sample to the next.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Run<'e> {
+    /// Which inputs go in lines.
+    lines: &'e [bool],
+    /// Of each input that acts later, what it was in the latest samples, the last one last.
+    pasts: Vec<Option<Array>>,
     transition: &'e Compiled,
-    /// The steps of an integration in a sample; none where the equations are of the next state.
-    steps: Option<usize>,
+    step: Step,
+    /// Of an exact step Psi, and X where an input goes in a line.
+    exact: Option<(Array, Option<Array>)>,
     observation: &'e Compiled,
     states: usize,
     inputs: usize,
@@ -76,6 +82,8 @@ struct Run<'e> {
     sample_time: f64,
     x: Array,
     u: Option<Array>,
+    /// Where an input goes in a line to the next sample: what it is there, and whether there was one.
+    ahead: Option<(Array, Array)>,
     rate: Array,
     /// How many samples have gone by, where the equations say t.
     clock: Option<Array>,
@@ -97,20 +105,38 @@ impl<'e> Run<'e> {
         model: &EquationsModel,
         with_derivatives: bool,
     ) -> Self {
-        let (transition, steps, observation) = equations.compiled();
+        let (transition, step, observation) = equations.compiled();
         let (states, inputs, outputs) = (equations.states().len(), model.inputs.len(), model.outputs.len());
         let mut memory = |name: &str, doc: &str, values: Vec<f64>| program.memory(name, doc, values);
-        let x =
-            memory("x", &format!("The state: {}.", model.states.join(", ")), equations.start().0.to_vec());
+        let x = memory("x", &format!("The state: {}.", model.states.join(", ")), equations.started().0);
         let u = (inputs > 0).then(|| memory("held_u", "The inputs.", vec![0.0; inputs]));
         let rate = memory("rate", "The next state, or its derivative.", vec![0.0; states]);
         let columns = if with_derivatives { 1 + states } else { 1 };
         let clock = (uses_time(transition, columns * states) || uses_time(observation, columns * outputs))
             .then(|| memory("samples", "How many samples have gone by.", vec![0.0]));
+        let lines = equations.linear_holds();
+        let ahead = u.filter(|_| !lines.is_empty()).map(|_| {
+            let ahead = memory("next_u", "The inputs of the sample.", vec![0.0; inputs]);
+            (ahead, memory("begun", "Whether there was a sample.", vec![0.0]))
+        });
+        let pasts = delays(equations).into_iter().enumerate().map(|(input, samples)| {
+            let length = samples? + 2;
+            let doc = "An input in the latest samples, the last one last.";
+            Some(memory(&format!("past_{}", input + 1), doc, vec![f64::NAN; length]))
+        });
+        let pasts: Vec<Option<Array>> = pasts.collect();
+        let matrices = equations.exact_matrices();
         let derivatives = with_derivatives.then(|| {
-            let mut square = |name: &str, doc: &str| memory(name, doc, vec![0.0; states * states]);
-            let m = square("m", "The derivative of the next state by the state, row by row.");
-            let of_steps = steps.map(|_| {
+            let doc = "The derivative of the next state by the state, row by row.";
+            if let Some([transition, ..]) = &matrices {
+                return Derivatives {
+                    m: program.table("M", doc, transposed(transition, states)),
+                    of_steps: None,
+                };
+            }
+            let mut square = |name: &str, doc: &str| program.memory(name, doc, vec![0.0; states * states]);
+            let m = square("m", doc);
+            let of_steps = matches!(step, Step::Integrated(_)).then(|| {
                 [
                     square("jacobian", "That of the equations."),
                     square("stage_m", "M at a stage of a step."),
@@ -120,10 +146,21 @@ impl<'e> Run<'e> {
             });
             Derivatives { m, of_steps }
         });
+        let exact = matrices.map(|[_, integral, second, _]| {
+            let mut square =
+                |name: &str, doc: &str, of: &[f64]| program.table(name, doc, transposed(of, states));
+            let stays = "What a derivative that stays leaves to the state, row by row.";
+            let integral = square("PSI", stays, &integral);
+            (integral, ahead.map(|_| square("X", "What one that grows by 1 in a second does.", &second)))
+        });
         let sample_time = model.sample_time;
         Self {
+            lines,
+            pasts,
+            ahead,
             transition,
-            steps,
+            step,
+            exact,
             observation,
             states,
             inputs,
@@ -143,17 +180,65 @@ impl<'e> Run<'e> {
         Some(since.map_or(now.clone(), |since| now + since))
     }
 
-    /// Takes the inputs.
-    fn take_inputs(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
+    /// Begins a sample: takes the inputs. Where one of them goes in lines, the state first goes on to this sample.
+    fn begin(
+        &self,
+        program: &mut Program,
+        signals: &Signals,
+        advance: impl FnOnce(&mut Program) -> Vec<Statement>,
+    ) -> Vec<Statement> {
         let Some(u) = self.u else { return Vec::new() };
-        program.repeat(self.inputs, |_, i| signals.hold_input(u, &i))
+        let into = self.ahead.map_or(u, |(ahead, _)| ahead);
+        let mut body = program.repeat(self.inputs, |_, i| signals.hold_input(into, &i));
+        if let Some((ahead, begun)) = self.ahead {
+            let condition = Condition::Less(0.0.into(), begun.at(0));
+            let mut then = advance(program);
+            then.extend(self.finish());
+            body.push(Statement::Choose { condition, then, otherwise: Vec::new() });
+            body.extend(
+                program.repeat(self.inputs, |_, i| vec![Statement::Store(u, i.clone(), ahead.at(i))]),
+            );
+            body.push(Statement::Store(begun, 0.into(), 1.0.into()));
+        }
+        for (input, past) in self.pasts.iter().enumerate() {
+            let Some(past) = *past else { continue };
+            body.extend(program.push(past, u.at(input)));
+            // Before the first sample an input was as in it.
+            body.extend(program.repeat(program.length(past), |_, i| {
+                let condition = Condition::Missing(past.at(i.clone()));
+                let then = vec![Statement::Store(past, i, u.at(input))];
+                vec![Statement::Choose { condition, then, otherwise: Vec::new() }]
+            }));
+        }
+        body
+    }
+
+    /// Ends a sample: goes on to the next, where the inputs of this one lead there.
+    fn end(
+        &self,
+        program: &mut Program,
+        advance: impl FnOnce(&mut Program) -> Vec<Statement>,
+    ) -> Vec<Statement> {
+        if self.ahead.is_some() {
+            return Vec::new();
+        }
+        let mut body = advance(program);
+        body.extend(self.finish());
+        body
+    }
+
+    /// What the equations are made of at a state, so long after the start of the sample, in parts of it.
+    fn leaves(&self, states: Array, since: Option<Value>, share: Option<Value>, step: f64) -> Leaves<'_> {
+        let ahead = self.ahead.map(|(ahead, _)| ahead).zip(share);
+        let (lines, pasts) = (self.lines, &self.pasts);
+        let time = self.time(since);
+        Leaves { states, inputs: self.u, ahead, lines, pasts, time, step, sample_time: self.sample_time }
     }
 
     /// So many results of the equations of the outputs: these, then their derivatives by the states, column after
     /// column.
     fn observed(&self, program: &mut Program, count: usize) -> (Vec<Statement>, Vec<Value>) {
-        let leaves = Leaves { states: self.x, inputs: self.u, time: self.time(None), step: 0.0 };
-        translated(program, self.observation, count, &leaves)
+        translated(program, self.observation, count, &self.leaves(self.x, None, None, 0.0))
     }
 
     /// What the equations of the states say, and where they are kept.
@@ -175,11 +260,15 @@ impl<'e> Run<'e> {
     /// Goes on to the next state.
     fn advance(&self, program: &mut Program) -> Vec<Statement> {
         let (n, x, rate, dt) = (self.states, self.x, self.rate, self.sample_time);
-        let Some(count) = self.steps else {
-            let leaves = Leaves { states: x, inputs: self.u, time: self.time(None), step: dt };
-            let mut body = self.rates(program, &leaves, self.derivatives.map(|own| own.m));
-            body.extend(program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), rate.at(i))]));
-            return body;
+        let count = match self.step {
+            Step::Next => {
+                let leaves = self.leaves(x, None, None, dt);
+                let mut body = self.rates(program, &leaves, self.derivatives.map(|own| own.m));
+                body.extend(program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), rate.at(i))]));
+                return body;
+            }
+            Step::Exact(_) => return self.exactly(program),
+            Step::Integrated(count) => count,
         };
         let stage = program.memory("stage", "The state at a stage of a step.", vec![0.0; n]);
         let sum = program.memory("sum", "The sum of the derivatives.", vec![0.0; n]);
@@ -195,7 +284,8 @@ impl<'e> Run<'e> {
             body.extend(program.repeat(n * n, |_, i| vec![Statement::Store(m, i, 0.0.into())]));
             body.extend(program.repeat(n, |_, i| vec![Statement::Store(m, i.entry(n, &i), 1.0.into())]));
         }
-        let begun = self.clock.map(|_| program.variable("begun"));
+        let knows_time = self.clock.is_some() || self.ahead.is_some();
+        let begun = knows_time.then(|| program.variable("begun_steps"));
         body.extend(begun.map(|begun| Statement::Let(begun, 0.0.into())));
         // The first stage takes nothing of the derivative before.
         for (size, _, rate, ..) in &added {
@@ -217,7 +307,8 @@ impl<'e> Run<'e> {
                 }));
             }
             let since = begun.map(|begun| (begun + shares.at(at.clone())) * h);
-            let leaves = Leaves { states: stage, inputs: self.u, time: self.time(since), step: h };
+            let share = begun.map(|begun| (begun + shares.at(at.clone())) / count as f64);
+            let leaves = self.leaves(stage, since, share, h);
             inner.extend(self.rates(program, &leaves, derivatives.map(|(_, [jacobian, ..])| jacobian)));
             if let Some((_, [jacobian, stage, rate, _])) = derivatives {
                 inner.extend(multiplied(program, n, [jacobian, stage, rate], false));
@@ -240,18 +331,47 @@ impl<'e> Run<'e> {
         body
     }
 
+    /// The exact step x + Psi f + X (f(end) - f)/dt.
+    fn exactly(&self, program: &mut Program) -> Vec<Statement> {
+        let (n, x, rate) = (self.states, self.x, self.rate);
+        let Some((integral, second)) = self.exact else { return Vec::new() };
+        let moved = program.memory("moved_x", "The state after the step.", vec![0.0; n]);
+        let add = |program: &mut Program, into: Array, matrix: Array, of: Array| {
+            program.repeat(n, |program, i| {
+                program.repeat(n, |_, k| {
+                    let sum = into.at(i.clone()) + matrix.at(i.entry(n, &k)) * of.at(k);
+                    vec![Statement::Store(into, i.clone(), sum)]
+                })
+            })
+        };
+        let mut body = self.rates(program, &self.leaves(x, None, Some(0.0.into()), 0.0), None);
+        body.extend(program.repeat(n, |_, i| vec![Statement::Store(moved, i.clone(), x.at(i))]));
+        body.extend(add(program, moved, integral, rate));
+        if let Some(second) = second {
+            let bend = program.memory("bend", "How fast the derivative grows.", vec![0.0; n]);
+            body.extend(program.repeat(n, |_, i| vec![Statement::Store(bend, i.clone(), rate.at(i))]));
+            body.extend(self.rates(program, &self.leaves(x, None, Some(1.0.into()), 0.0), None));
+            body.extend(program.repeat(n, |_, i| {
+                let grown = (rate.at(i.clone()) - bend.at(i.clone())) / self.sample_time;
+                vec![Statement::Store(bend, i, grown)]
+            }));
+            body.extend(add(program, moved, second, bend));
+        }
+        body.extend(program.repeat(n, |_, i| vec![Statement::Store(x, i.clone(), moved.at(i))]));
+        body
+    }
+
     /// The sample is over.
     fn finish(&self) -> Option<Statement> {
         self.clock.map(|clock| Statement::Store(clock, 0.into(), clock.at(0) + 1.0))
     }
 
     fn simulator(&self, program: &mut Program, signals: &Signals) -> Entry {
-        let mut body = self.take_inputs(program, signals);
+        let mut body = self.begin(program, signals, |program| self.advance(program));
         let (statements, outputs) = self.observed(program, self.outputs);
         body.extend(statements);
         body.extend(outputs.into_iter().enumerate().map(|(place, value)| signals.say(&place.into(), value)));
-        body.extend(self.advance(program));
-        body.extend(self.finish());
+        body.extend(self.end(program, |program| self.advance(program)));
         signals.responds("step", FREE_RUN, body)
     }
 }
@@ -270,6 +390,17 @@ fn multiplied(program: &mut Program, n: usize, [a, b, into]: [Array; 3], transpo
             body
         })
     })
+}
+
+/// A matrix column after column, row by row.
+fn transposed(matrix: &[f64], n: usize) -> Vec<f64> {
+    (0..n * n).map(|place| matrix[place % n * n + place / n]).collect()
+}
+
+/// The longest delay of each input in whole samples; none of one that acts at once.
+fn delays(equations: &GreyBox) -> Vec<Option<usize>> {
+    let samples = |delay: f64| (delay / equations.sample_time()).floor() as usize;
+    equations.delays().into_iter().map(|longest| longest.map(samples)).collect()
 }
 
 fn uses_time(program: &Compiled, count: usize) -> bool {

@@ -12,6 +12,7 @@ use super::frame::Frame;
 use super::lags::Lags;
 use super::linear::Linear;
 use super::linearization::{Function, Linearization, Work};
+use super::past::Past;
 use crate::data::Offset;
 use crate::model::{GreyBox, equations::whole_steps};
 
@@ -34,8 +35,8 @@ pub(super) type Division = (usize, f64);
 
 /// The outputs that a filter expects, and how certain they are.
 pub(super) enum Expected<'a> {
-    /// By H, which has a column for each state and each unknown parameter.
-    Linear(DVector<f64>, Cow<'a, DMatrix<f64>>),
+    /// By H, which has a column for each state and each unknown parameter, and R.
+    Linear(DVector<f64>, Cow<'a, DMatrix<f64>>, Cow<'a, DMatrix<f64>>),
     /// With the variances of the innovations.
     Known(DVector<f64>, DVector<f64>),
 }
@@ -149,12 +150,17 @@ impl Kind {
         match self {
             Kind::Sampled(frame, _) => Filter::new(frame.start.clone(), frame.start_covariance.clone()),
             Kind::Grey(grey) => {
-                let (states, deviations) = grey.start();
-                let parameters = || grey.parameters().iter().map(|parameter| parameter.start_variable());
-                let mean: Vec<f64> = states.iter().copied().chain(parameters().map(|(z, _)| z)).collect();
-                let deviations = deviations.iter().copied().chain(parameters().map(|(_, sd)| sd));
-                let variances: Vec<f64> = deviations.map(|deviation| deviation * deviation).collect();
-                Filter::new(mean.into(), Covariance::from_diagonal(&variances.into())?)
+                // [x; z] = [x0(z) + e; z] with e and z independent of each other.
+                let (mut mean, mut variances, slopes) = grey.started();
+                let n = mean.len();
+                for parameter in grey.parameters() {
+                    let (z, deviation) = parameter.start_variable();
+                    mean.push(z);
+                    variances.push(deviation * deviation);
+                }
+                let mut joint = DMatrix::identity(mean.len(), mean.len());
+                joint.view_mut((0, n), slopes.shape()).copy_from(&slopes);
+                Filter::new(mean.into(), Covariance::from_diagonal(&variances.into())?.transformed(&joint)?)
             }
         }
     }
@@ -170,22 +176,14 @@ impl Kind {
         }
     }
 
-    /// R_ii.
-    pub(super) fn output_variance(&self, output: usize) -> f64 {
-        match self {
-            Kind::Sampled(frame, _) => frame.output_noise[(output, output)],
-            Kind::Grey(grey) => grey.measurement_variances()[output],
-        }
-    }
-
-    /// From one row to the next: inputs are held between them.
+    /// From one row to the next, which is the latest of the past: inputs are held between them, or go in lines.
     pub(super) fn predict(
         &self,
         filter: &mut impl Recursion,
         from: &Sample,
         to: &Sample,
         (count, dt): Division,
-        work: &mut Work,
+        (past, work): (&Past, &mut Work),
     ) -> Result<(), Error> {
         match self {
             Kind::Sampled(frame, motion) => match motion {
@@ -215,7 +213,7 @@ impl Kind {
             },
             Kind::Grey(grey) => {
                 for index in 0..count {
-                    let (time, inputs) = (from.time + index as f64 * dt, from.inputs.as_slice());
+                    let (time, inputs) = (from.time + index as f64 * dt, past.drive(from, 1));
                     let transition = Function::at(filter.state(), |x: &[f64]| {
                         Linearization::ahead(grey, x, inputs, time, dt, work)
                     })?;
@@ -231,7 +229,7 @@ impl Kind {
         &self,
         filter: &mut impl Recursion,
         at: &Sample,
-        work: &mut Work,
+        (past, work): (&Past, &mut Work),
         show: impl FnOnce(&Expected<'_>),
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
         match self {
@@ -239,18 +237,20 @@ impl Kind {
                 let seen = &frame.observation;
                 let linear = || {
                     let outputs = seen.output(filter.state(), &at.inputs);
-                    Expected::Linear(outputs, Cow::Borrowed(&frame.output_matrix))
+                    let noise = Cow::Borrowed(&frame.output_noise);
+                    Expected::Linear(outputs, Cow::Borrowed(&frame.output_matrix), noise)
                 };
                 show(&filter.expected(seen, &at.inputs)?.unwrap_or_else(linear));
                 filter.correct(seen, &at.inputs, &at.outputs)
             }
             Kind::Grey(grey) => {
+                let inputs = past.drive(at, 0);
                 let seen = Function::at(filter.state(), |x: &[f64]| {
-                    Linearization::seen(grey, x, at.inputs.as_slice(), at.time, work)
+                    Linearization::seen(grey, x, inputs, at.time, work)
                 })?;
                 let linear = || {
-                    let (outputs, h) = seen.linear(filter.state());
-                    Expected::Linear(outputs, Cow::Owned(h))
+                    let Linearization { values, jacobian, noise } = seen.linear(filter.state());
+                    Expected::Linear(values, Cow::Owned(jacobian), Cow::Owned(noise.matrix()))
                 };
                 show(&filter.expected(&seen, &at.inputs)?.unwrap_or_else(linear));
                 filter.correct(&seen, &at.inputs, &at.outputs)
@@ -266,7 +266,7 @@ impl Kind {
         from: &Sample,
         to: &Sample,
         (count, dt): Division,
-        work: &mut Work,
+        (past, work): (&Past, &mut Work),
     ) -> Result<(), Error> {
         let missing = DVector::repeat(from.outputs.len(), f64::NAN);
         for index in 0..count {
@@ -291,9 +291,9 @@ impl Kind {
                 }
                 Kind::Grey(grey) => {
                     let (time, estimate) = (from.time + index as f64 * dt, observer.state().as_slice());
-                    let inputs = from.inputs.as_slice();
-                    let transition = Linearization::ahead(grey, estimate, inputs, time, dt, work)?;
-                    let observation = Linearization::seen(grey, estimate, inputs, time, work)?;
+                    let drive = past.drive(from, 1);
+                    let transition = Linearization::ahead(grey, estimate, drive, time, dt, work)?;
+                    let observation = Linearization::seen(grey, estimate, drive, time, work)?;
                     if let Some(poles) = place {
                         observer.place(&transition, &observation, &from.inputs, &self.weights(), poles)?;
                     }
@@ -309,29 +309,26 @@ impl Kind {
         &self,
         estimate: &DVector<f64>,
         at: &Sample,
-        work: &mut Work,
+        (past, work): (&Past, &mut Work),
     ) -> Result<DVector<f64>, Error> {
         Ok(match self {
             Kind::Sampled(frame, _) => frame.observation.output(estimate, &at.inputs),
             Kind::Grey(grey) => {
-                Linearization::seen(grey, estimate.as_slice(), at.inputs.as_slice(), at.time, work)?.values
+                Linearization::seen(grey, estimate.as_slice(), past.drive(at, 0), at.time, work)?.values
             }
         })
     }
 
-    /// How the outputs are weighed where an observer needs one number of them.
+    /// How the outputs are weighed where an observer needs one number of them: by their noise, that of the start where it
+    /// is not the same in all rows.
     pub(super) fn weights(&self) -> DVector<f64> {
-        let outputs = match self {
-            Kind::Sampled(frame, _) => frame.names.outputs.len(),
-            Kind::Grey(grey) => grey.outputs().len(),
+        let variances: Vec<f64> = match self {
+            Kind::Sampled(frame, _) => frame.output_noise.diagonal().iter().copied().collect(),
+            Kind::Grey(grey) => grey.measurement_variances_at_start(),
         };
-        let noisy = outputs > 1 && (0..outputs).all(|output| self.output_variance(output) > 0.0);
-        DVector::from_fn(
-            outputs,
-            |output, _| {
-                if noisy { self.output_variance(output).sqrt().recip() } else { 1.0 }
-            },
-        )
+        let noisy = variances.len() > 1 && variances.iter().all(|variance| *variance > 0.0);
+        let each = variances.iter().map(|variance| if noisy { variance.sqrt().recip() } else { 1.0 });
+        DVector::from_iterator(variances.len(), each)
     }
 
     /// What is taken from the channels; nothing where there is no offset.

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, Observation, Transition};
 
-use crate::model::GreyBox;
+use crate::model::{GreyBox, equations, equations::Drive};
 
 /// A function of states and unknown parameters with its Jacobian and its noise, all at one estimate.
 ///
@@ -27,10 +27,16 @@ pub(super) struct Linearization {
 }
 
 /// Numbers to work in.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Work {
     jacobian: Vec<f64>,
-    program: Vec<f64>,
+    program: equations::Work<f64>,
+}
+
+impl Work {
+    pub(super) const fn new() -> Self {
+        Self { jacobian: Vec::new(), program: equations::Work::new() }
+    }
 }
 
 impl Linearization {
@@ -38,7 +44,7 @@ impl Linearization {
     pub(super) fn ahead(
         model: &GreyBox,
         estimate: &[f64],
-        inputs: &[f64],
+        inputs: Drive<'_>,
         t: f64,
         dt: f64,
         work: &mut Work,
@@ -55,11 +61,23 @@ impl Linearization {
             target[..n].copy_from_slice(column);
         }
         let share = dt / model.sample_time();
-        let walks = model.parameters().iter().map(|parameter| match parameter.walk {
-            0.0 => 0.0,
-            _ => parameter.walk_variable().powi(2) * share,
-        });
-        let noise = DVector::from_iterator(size, model.process_variances(dt).chain(walks));
+        let mut noise = DVector::zeros(size);
+        let (of_states, of_parameters) = noise.as_mut_slice().split_at_mut(n);
+        if z.is_empty() {
+            let mut factor = DMatrix::zeros(n, n);
+            let entries = factor.as_mut_slice();
+            model.process_noise(x, z, inputs, t, dt, entries, of_states, &mut work.program);
+            let noise = Covariance::from_diagonal(&noise)?;
+            let is_diagonal = factor.is_identity(0.0);
+            let noise = if is_diagonal { noise } else { noise.transformed(&factor)? };
+            return Ok(Self { values, jacobian, noise });
+        }
+        model.added_variances(x, z, inputs, t, dt, of_states, &mut work.program);
+        for (variance, parameter) in of_parameters.iter_mut().zip(model.parameters()) {
+            if parameter.walk != 0.0 {
+                *variance = parameter.walk_variable().powi(2) * share;
+            }
+        }
         Ok(Self { values, jacobian, noise: Covariance::from_diagonal(&noise)? })
     }
 
@@ -67,17 +85,17 @@ impl Linearization {
     pub(super) fn seen(
         model: &GreyBox,
         estimate: &[f64],
-        inputs: &[f64],
+        inputs: Drive<'_>,
         t: f64,
         work: &mut Work,
     ) -> Result<Self, Error> {
         let (x, z) = estimate.split_at(model.states().len());
-        let variances = model.measurement_variances();
-        let mut values = DVector::zeros(variances.len());
-        let mut jacobian = DMatrix::zeros(variances.len(), estimate.len());
+        let outputs = model.outputs().len();
+        let (mut values, mut noise) = (DVector::zeros(outputs), DVector::zeros(outputs));
+        let mut jacobian = DMatrix::zeros(outputs, estimate.len());
         model.observe(x, z, inputs, t, values.as_mut_slice(), jacobian.as_mut_slice(), &mut work.program);
-        let noise = Covariance::from_diagonal(&DVector::from_column_slice(variances))?;
-        Ok(Self { values, jacobian, noise })
+        model.measurement_variances(x, z, inputs, t, noise.as_mut_slice(), &mut work.program);
+        Ok(Self { values, jacobian, noise: Covariance::from_diagonal(&noise)? })
     }
 }
 
@@ -109,9 +127,9 @@ impl<E: FnMut(&[f64]) -> Result<Linearization, Error>> Function<E> {
         take(&latest.1)
     }
 
-    /// The values and the Jacobian here.
-    pub(super) fn linear(&self, place: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
-        self.taken(place, |found| (found.values.clone(), found.jacobian.clone()))
+    /// All of it here.
+    pub(super) fn linear(&self, place: &DVector<f64>) -> Linearization {
+        self.taken(place, Linearization::clone)
     }
 }
 

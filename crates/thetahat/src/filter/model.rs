@@ -49,8 +49,9 @@ impl From<(Frame, Lags)> for StateModel {
 }
 
 impl From<GreyBox> for StateModel {
+    /// Unknown noises are taken as they start: a filter does not find them.
     fn from(model: GreyBox) -> Self {
-        Self { kind: Kind::Grey(Box::new(model)) }
+        Self { kind: Kind::Grey(Box::new(model.with_noises_as_they_start())) }
     }
 }
 

@@ -146,11 +146,11 @@ impl Row {
     }
 
     /// The outputs that a filter expects, and the deviations of its innovations.
-    pub(super) fn expected(&mut self, kind: &Kind, expected: &Expected<'_>, sample: &Sample) {
+    pub(super) fn expected(&mut self, expected: &Expected<'_>, sample: &Sample) {
         match expected {
-            Expected::Linear(outputs, h) => {
+            Expected::Linear(outputs, h, noise) => {
                 self.seen(outputs, sample);
-                self.output_deviations(kind, h);
+                self.output_deviations(h, noise);
             }
             Expected::Known(outputs, variances) => {
                 self.seen(outputs, sample);
@@ -162,7 +162,7 @@ impl Row {
     }
 
     /// The roots of S_ii = h_i'P h_i + R_ii, with the covariance of the prediction.
-    fn output_deviations(&mut self, kind: &Kind, h: &DMatrix<f64>) {
+    fn output_deviations(&mut self, h: &DMatrix<f64>, noise: &DMatrix<f64>) {
         let (size, outputs) = (self.predicted.len(), self.output_deviations.len());
         let h = h.as_slice();
         for (output, deviation) in self.output_deviations.iter_mut().enumerate() {
@@ -172,7 +172,7 @@ impl Row {
                 let column = &self.covariance[i * size..(i + 1) * size];
                 variance += h[output + i * outputs] * column.iter().zip(row).map(|(p, h)| p * h).sum::<f64>();
             }
-            *deviation = (variance.max(0.0) + kind.output_variance(output)).sqrt();
+            *deviation = (variance.max(0.0) + noise[(output, output)]).sqrt();
         }
     }
 

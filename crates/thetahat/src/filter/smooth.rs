@@ -6,6 +6,7 @@ use super::estimate::StateValues;
 use super::estimator::Engine;
 use super::kind::{Division, Kind, Recursion, Sample, Unscented};
 use super::linearization::Work;
+use super::past::Past;
 use crate::Error;
 
 /// The states of a record, each given all of its rows, later ones too.
@@ -117,16 +118,17 @@ fn smoothed<S: Recursion>(
     history: &[(Option<Division>, Sample)],
     smooth: impl FnOnce(&S) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error>,
 ) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error> {
-    let mut work = Work::default();
+    let (mut past, mut work) = (Past::new(kind), Work::new());
     // Which of the smoother's samples a row is.
     let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
     let mut previous = None;
     for (division, sample) in history {
+        past.push(sample);
         if let Some((previous, division)) = previous.zip(*division) {
-            kind.predict(&mut smoother, previous, sample, division, &mut work)?;
+            kind.predict(&mut smoother, previous, sample, division, (&past, &mut work))?;
             place += division.0;
         }
-        kind.correct(&mut smoother, sample, &mut work, |_| ())?;
+        kind.correct(&mut smoother, sample, (&past, &mut work), |_| ())?;
         places.push(place);
         previous = Some(sample);
     }

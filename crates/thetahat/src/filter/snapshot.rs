@@ -6,6 +6,7 @@ use thetahat_core::nalgebra::DVector;
 use super::StateFilter;
 use super::estimator::Engine;
 use super::kind::{Filter, Observer, Sample, Unscented};
+use super::past::Past;
 use super::row::{Row, Told};
 use super::totals::Totals;
 use crate::Error;
@@ -23,6 +24,9 @@ pub struct FilterSnapshot {
     totals: Totals,
     row: Row,
     told: Option<Told>,
+    /// The times and inputs of rows before, where the model needs them.
+    #[serde(default)]
+    past: (Vec<f64>, Vec<f64>),
 }
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -71,6 +75,7 @@ impl StateFilter {
             totals: self.totals,
             row: self.row.clone(),
             told: self.told,
+            past: (self.past.rows().0.to_vec(), self.past.rows().1.to_vec()),
         }
     }
 
@@ -79,7 +84,7 @@ impl StateFilter {
     /// # Errors
     /// [`Error::Data`] if the snapshot is of a filter of another size or estimator.
     pub fn resumed(mut self, snapshot: FilterSnapshot) -> Result<Self, Error> {
-        let FilterSnapshot { estimator, origin, engine, previous, totals, row, told } = snapshot;
+        let FilterSnapshot { estimator, origin, engine, previous, totals, row, told, past } = snapshot;
         let (states, inputs, outputs) =
             (self.row.predicted.len(), self.model.inputs().len(), self.model.outputs().len());
         let previous = previous.map(|SampleSnapshot { time, inputs, outputs }| Sample {
@@ -102,9 +107,10 @@ impl StateFilter {
             && previous.is_some() == told.is_some()
             && previous.is_some() == (totals.rows > 0)
             && row.is_like(&self.row);
-        if !fits {
+        let past = Past::new(&self.model.kind).with_rows(past.0, past.1, inputs);
+        let Some(past) = past.filter(|_| fits) else {
             return Err(Error::data("the snapshot is of a filter of another model or estimator"));
-        }
+        };
         match (engine, &mut self.engine) {
             (EngineSnapshot::Filter(kept), Engine::Filter(filter)) => *filter = kept,
             (EngineSnapshot::Unscented(kept), Engine::Unscented(filter)) => *filter = kept,
@@ -112,7 +118,7 @@ impl StateFilter {
             // Seen above.
             _ => {}
         }
-        self.history = None;
+        (self.history, self.past) = (None, past);
         self.row.clone_from(&row);
         self.next = row;
         (self.origin, self.previous, self.totals, self.told) = (origin, previous, totals, told);

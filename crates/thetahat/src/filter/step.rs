@@ -5,6 +5,7 @@ use super::estimator::{Engine, Estimator};
 use super::kind::{Division, Gaussian, Kind, Sample};
 use super::linearization::Work;
 use super::model::StateModel;
+use super::past::Past;
 use super::row::{Row, Told};
 use super::totals::Totals;
 use crate::Error;
@@ -70,6 +71,8 @@ pub struct StateFilter {
     /// Where the next row is worked out: a step that fails leaves the last one as it is.
     pub(super) next: Row,
     pub(super) told: Option<Told>,
+    /// The inputs of rows before, where the model needs them.
+    pub(super) past: Past,
     work: Work,
     /// All rows with the step before each, for a smoother.
     pub(super) history: Option<Vec<(Option<Division>, Sample)>>,
@@ -82,9 +85,10 @@ impl StateFilter {
     /// [`Error::Argument`] if the model is not for this estimator, or an observer's poles or gain do not fit the model.
     pub fn new(model: StateModel, estimator: Estimator) -> Result<Self, Error> {
         let (word, engine) = (estimator.word(), Engine::new(&model, estimator)?);
-        let row = Row::new(&model);
+        let (row, past) = (Row::new(&model), Past::new(&model.kind));
         Ok(Self {
             model,
+            past,
             estimator: word,
             engine,
             origin: 0.0,
@@ -93,7 +97,7 @@ impl StateFilter {
             next: row.clone(),
             row,
             told: None,
-            work: Work::default(),
+            work: Work::new(),
             history: None,
         })
     }
@@ -187,23 +191,26 @@ impl StateFilter {
         };
         let time = self.previous.as_ref().map_or(self.origin, |previous| previous.time + seconds);
         let sample = self.sample(time, inputs, outputs);
-        let Self { model: StateModel { kind }, engine, previous, next, work, .. } = self;
+        let Self { model: StateModel { kind }, engine, previous, next, past, work, .. } = self;
         let from = previous.as_ref().zip(division);
 
         // On copies, as a failed step must change nothing.
-        let mut engine = engine.clone();
+        let (mut engine, mut past) = (engine.clone(), past.clone());
+        past.push(&sample);
         let told = match &mut engine {
-            Engine::Filter(filter) => filtered(kind, filter, from, &sample, next, work).map_err(refused)?,
+            Engine::Filter(filter) => {
+                filtered(kind, filter, from, &sample, next, (&past, work)).map_err(refused)?
+            }
             Engine::Unscented(filter) => {
-                filtered(kind, filter, from, &sample, next, work).map_err(refused)?
+                filtered(kind, filter, from, &sample, next, (&past, work)).map_err(refused)?
             }
             Engine::Observer { observer, poles } => {
                 if let Some((previous, division)) = from {
-                    kind.observe(observer, poles.as_ref(), previous, &sample, division, work)
+                    kind.observe(observer, poles.as_ref(), previous, &sample, division, (&past, work))
                         .map_err(refused)?;
                 }
                 next.predicted.copy_from_slice(observer.state().as_slice());
-                let outputs = kind.outputs(observer.state(), &sample, work).map_err(refused)?;
+                let outputs = kind.outputs(observer.state(), &sample, (&past, work)).map_err(refused)?;
                 if !outputs.iter().all(|output| output.is_finite()) {
                     return Err(refused(thetahat_core::Error::Overflow));
                 }
@@ -212,7 +219,7 @@ impl StateFilter {
             }
         };
         next.finish(kind, time, inputs);
-        self.engine = engine;
+        (self.engine, self.past) = (engine, past);
         std::mem::swap(&mut self.row, &mut self.next);
         if let Some(history) = &mut self.history {
             history.push((division, sample.clone()));
@@ -248,13 +255,13 @@ fn filtered(
     from: Option<(&Sample, Division)>,
     sample: &Sample,
     row: &mut Row,
-    work: &mut Work,
+    (past, work): (&Past, &mut Work),
 ) -> Result<Told, thetahat_core::Error> {
     if let Some((previous, division)) = from {
-        kind.predict(filter, previous, sample, division, work)?;
+        kind.predict(filter, previous, sample, division, (past, work))?;
     }
     row.predicted(filter)?;
-    let innovation = kind.correct(filter, sample, work, |expected| row.expected(kind, expected, sample))?;
+    let innovation = kind.correct(filter, sample, (past, work), |expected| row.expected(expected, sample))?;
     row.filtered(filter);
     row.parameters(kind);
     Ok(Told::of(&innovation))

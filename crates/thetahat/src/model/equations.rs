@@ -3,12 +3,16 @@
 mod branch;
 mod channels;
 mod document;
+mod drive;
 mod dynamics;
+mod exact;
 mod expression;
 mod fitted;
 mod graph;
 mod interpolation;
 mod linear;
+mod noise;
+mod parameter;
 mod program;
 mod read;
 mod scale;
@@ -18,9 +22,13 @@ pub(crate) mod tests;
 
 pub(crate) use channels::{ChannelExpression, ExpressionBuffer};
 pub(crate) use document::{Document, Entry, Section, suggestion};
-use dynamics::{Functions, Step};
+pub(crate) use drive::Drive;
+use dynamics::Functions;
+pub(crate) use dynamics::{Step, Work};
 pub use fitted::EquationsModel;
 pub(crate) use graph::{Function, Operation};
+use noise::Noise;
+pub(crate) use parameter::Unknown;
 pub(crate) use program::Program;
 pub(crate) use scale::Scale;
 pub(crate) use table::Table;
@@ -80,13 +88,21 @@ use crate::Error;
 /// unknown ones too.
 ///
 /// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else
-/// each is one `sample_time`. `[derivative]` gives dx/dt; it is integrated by the classical Runge-Kutta method of order
-/// four in one step from row to row, or in `substeps` of them, with the input held. A step of several sample times is
-/// taken as that many equal steps, so that a missing row does no harm.
+/// each is one `sample_time`. `[derivative]` gives dx/dt; where it is linear in states and inputs and does not know the
+/// time, the step is exact. Else it is integrated by the classical Runge-Kutta method of order four in one step from row
+/// to row, or in `substeps` of them. A step of several sample times is taken as that many equal steps, so that a missing
+/// row does no harm.
+///
+/// **Inputs** are held from row to row, or go in straight lines to the next with `force = { channel = "u", hold =
+/// "linear" }`, which needs `[derivative]`. `force(t - delay)` is an input so many seconds ago, with a delay that is a
+/// number or made of parameters; one that is held is then taken as its mean over the step.
 ///
 /// **Noise.** `process` is what a sample of length `sample_time` adds to the state: its variance grows with the length
-/// of the step, sd² dt/sample_time. A state that is not named has none. `measurement` is the standard deviation of each
-/// output.
+/// of the step, sd² dt/sample_time. A state that is not named has none. An exact step takes it as white noise of the
+/// intensity sd²/sample_time that acts all the time; else it is added at the end of the step. `measurement` is the
+/// standard deviation of each output. Each is a number; an expression of states, inputs, parameters and `t`; or unknown,
+/// `{ start = 0.1, unknown = true }`, and then a parameter by the name of `process.velocity` or `measurement.y`, above 0
+/// unless `min` says other. `start` and `sd` of a state may be expressions of parameters.
 ///
 /// **Unknown parameters** have a `start`, the standard deviation `sd` of what is known of it, and perhaps bounds `min`
 /// and `max`, between which a change of variable keeps them: p = min + exp(z), p = max - exp(z), or p = min + (max -
@@ -128,8 +144,6 @@ pub struct GreyBox {
     text: String,
     sample_time: f64,
     states: Vec<String>,
-    start: Vec<f64>,
-    start_deviations: Vec<f64>,
     inputs: Vec<String>,
     outputs: Vec<String>,
     unknown: Vec<Unknown>,
@@ -138,23 +152,17 @@ pub struct GreyBox {
     step: Step,
     /// Whether the equations know the length of a step.
     any_step: bool,
+    /// Which inputs go from row to row in straight lines; empty where none does.
+    linear_holds: Vec<bool>,
+    /// Whether the equations of the states are other ones at the end of a step: for an input that goes in a line.
+    bends: bool,
+    /// The longest delay of each input, in seconds, with parameters as they start; none of one that acts at once.
+    delays: Vec<Option<f64>>,
     linear: bool,
     superposes: bool,
     transition: Functions,
     observation: Functions,
-    process_variances: Vec<f64>,
-    measurement_variances: Vec<f64>,
-}
-
-/// A parameter that is to be found.
-#[derive(Debug, Clone)]
-pub(crate) struct Unknown {
-    pub(crate) name: String,
-    pub(crate) scale: Scale,
-    /// In the parameter's own unit.
-    pub(crate) start: f64,
-    pub(crate) deviation: f64,
-    pub(crate) walk: f64,
+    noise: Noise,
 }
 
 /// The most equal steps that one step is divided into.
@@ -180,13 +188,23 @@ impl GreyBox {
                 let near = suggestion(name, self.unknown());
                 return Err(Error::argument(name, format!("the model has no such unknown parameter{near}")));
             };
-            if !unknown.scale.contains(*value) {
+            if !unknown.may_be(*value) {
                 return Err(Error::argument(name, format!("{value} is outside of the parameter's bounds")));
             }
         }
         let mut known = self.known.clone();
         known.extend(values.iter().map(|(name, value)| ((*name).to_owned(), *value)));
         read::model(&self.text, &known)
+    }
+
+    /// The same with what only noises depend on known, as it starts.
+    pub(crate) fn with_noises_as_they_start(self) -> Self {
+        let of_noise = self.unknown.iter().filter(|unknown| unknown.of_noise);
+        let starts: Vec<(&str, f64)> =
+            of_noise.map(|unknown| (unknown.name.as_str(), unknown.start)).collect();
+        // The text was read with other values before.
+        let known = if starts.is_empty() { None } else { self.with_parameters(&starts).ok() };
+        known.unwrap_or(self)
     }
 
     /// Those of the unknown parameters that were given values.
@@ -235,6 +253,21 @@ impl GreyBox {
         self.superposes
     }
 
+    /// Which inputs go from row to row in straight lines; empty where none does.
+    pub(crate) fn linear_holds(&self) -> &[bool] {
+        &self.linear_holds
+    }
+
+    /// The longest delay of an input, in seconds, with parameters as they start; none without delays.
+    pub(crate) fn longest_delay(&self) -> Option<f64> {
+        self.delays.iter().copied().flatten().reduce(f64::max)
+    }
+
+    /// That of each input; none of one that acts at once.
+    pub(crate) fn delays(&self) -> Vec<Option<f64>> {
+        self.delays.clone()
+    }
+
     /// What is known of the unknown parameters, and their changes of variable.
     pub(crate) fn parameters(&self) -> &[Unknown] {
         &self.unknown
@@ -252,24 +285,6 @@ impl GreyBox {
         } else {
             Ok((whole_steps(dt, self.sample_time)?, self.sample_time))
         }
-    }
-}
-
-impl Unknown {
-    /// What the parameter starts from after the change of variable: z, and its standard deviation.
-    pub(crate) fn start_variable(&self) -> (f64, f64) {
-        let z = self.scale.variable(self.start);
-        (z, self.deviation / self.scale.slope(z).abs())
-    }
-
-    /// The standard deviation by which z drifts each sample: as p does where it starts.
-    pub(crate) fn walk_variable(&self) -> f64 {
-        self.walk / self.scale.slope(self.scale.variable(self.start)).abs()
-    }
-
-    /// The change of variable in words; none without bounds.
-    pub(crate) fn change_of_variable(&self) -> Option<String> {
-        self.scale.words(&self.name)
     }
 }
 

@@ -192,6 +192,9 @@ options! {
         step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R];
         /// Search from this many further starts
         starts: Option<usize>, "K", "0, with `narx` 4, with `grey` some where the first one fails", SEARCH, [P C N E R];
+        /// Add intervals of 95 % by profile likelihood, which know bounds and curvature; some twenty searches for each
+        /// parameter
+        profile: bool, "", "", SEARCH, [E];
         /// The seed of random starts and of random centres
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
         /// After this time begin no iteration and no search from a further start

@@ -6,7 +6,9 @@ use crate::estimate::{Criteria, InformationCriterion};
 use crate::figures::{chance, fixed, number, three};
 use crate::model::{LinearModel, Orders};
 use crate::present::Layout;
-use crate::report::{Comparison, InSample, Report, Requirement, Validated, Validation, compare};
+use crate::report::{
+    Comparison, InSample, LikelihoodRatio, Report, Requirement, Validated, Validation, compare,
+};
 use crate::respond::Horizon;
 use crate::text::harmless;
 use crate::validate::{Fit, Residuals};
@@ -112,6 +114,7 @@ pub fn comparison(comparison: &Comparison, layout: Layout) -> String {
     let models: Vec<(String, &Validation)> =
         comparison.models.iter().map(|model| (named(model), model)).collect();
     side_by_side(on, &models, comparison.criteria.as_deref());
+    likelihood_ratios(on, &models, &comparison.likelihood_ratios);
     super::text::written(on, layout)
 }
 
@@ -139,8 +142,10 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
         on.line(format!("{name} is {}", report.model.headline()));
     }
     on.section("Side by side");
-    let criteria = compare(validated).ok().and_then(|comparison| comparison.criteria);
-    side_by_side(on, &models, criteria.as_deref());
+    let comparison = compare(validated).ok();
+    let criteria = comparison.as_ref().and_then(|comparison| comparison.criteria.as_deref());
+    side_by_side(on, &models, criteria);
+    likelihood_ratios(on, &models, comparison.as_ref().map_or(&[], |own| &own.likelihood_ratios));
     on.line("Anderson stops at the smallest alpha at which a fraction alpha of the correlations of the residuals, or more, lies \
              outside the band of that level. The larger, the better; it is no verdict.");
     compared_outputs(on, reports, &named, logs);
@@ -176,6 +181,21 @@ pub fn comparison_page(reports: &[Report], validated: &[Validated], command: &st
         generator: validated.first().map_or("thetahat", |validated| &validated.validation.generator),
     }
     .write())
+}
+
+/// Whether the further parameters of a model say something.
+fn likelihood_ratios(on: &mut Sections, models: &[(String, &Validation)], ratios: &[LikelihoodRatio]) {
+    for LikelihoodRatio { smaller, larger, ratio, parameters, p_value } in ratios {
+        let (Some((smaller, _)), Some((larger, _))) = (models.get(*smaller), models.get(*larger)) else {
+            continue;
+        };
+        on.line(format!(
+            "{larger} has {} beside what {smaller} has: likelihood ratio {}, p-value {}",
+            parameters.join(", "),
+            number(*ratio),
+            chance(*p_value)
+        ));
+    }
 }
 
 /// The figures of several models.

@@ -14,8 +14,8 @@ use crate::Error;
 use crate::data::{Log, Rows, Source, Split};
 use crate::estimate::{
     Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, NullDistribution, Procedure,
-    Question,
-    equations::{EquationsEstimate, largest_likelihood, largest_likelihood_of},
+    ProfileInterval, Question,
+    equations::{EquationsEstimate, intervals, largest_likelihood, largest_likelihood_of},
 };
 use crate::model::{EquationsModel, GreyBox};
 use crate::respond::{
@@ -42,6 +42,8 @@ pub struct EquationsPlan {
     pub search: Search,
     /// Whether searches from the start of the model alone are left at that, where it leads to no maximum.
     pub own_start_only: bool,
+    /// Whether intervals by profile likelihood are computed.
+    pub profile: bool,
 }
 
 /// Finds the unknown parameters of a model in equations in a log, or in several that are joined, and reports on it.
@@ -134,9 +136,14 @@ pub fn fit_equations(
     plan: &EquationsPlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    fit(model, log, sources, plan, |experiments| {
-        largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor)
-    })
+    fit(
+        model,
+        log,
+        sources,
+        plan,
+        |experiments| largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor),
+        monitor,
+    )
 }
 
 /// The same, but others compute the likelihood and its slopes for each point where the search stands: each holder has
@@ -159,18 +166,31 @@ pub fn fit_equations_distributed(
         let message = "all rows serve for the fit; cut the experiments, and validate the model on other ones";
         return Err(Error::argument("rows", message));
     }
+    if plan.profile {
+        return Err(Error::argument(
+            "profile",
+            "it needs the logs themselves, which others hold; leave it out",
+        ));
+    }
     if counts.iter().sum::<usize>() != log.logs().count() {
         return Err(Error::argument(
             "counts",
             "they are not those of the logs; count the logs of each holder",
         ));
     }
-    fit(model, log, sources, plan, |experiments| {
-        let holders = Holders::new(ask, counts.len());
-        let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
-        let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
-        holders.failure().map_or(found, Err)
-    })
+    fit(
+        model,
+        log,
+        sources,
+        plan,
+        |experiments| {
+            let holders = Holders::new(ask, counts.len());
+            let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
+            let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
+            holders.failure().map_or(found, Err)
+        },
+        monitor,
+    )
 }
 
 /// What the logs of one holder answer, see [`fit_equations_distributed`].
@@ -190,6 +210,7 @@ fn fit(
     sources: &[Source],
     plan: &EquationsPlan,
     search: impl FnOnce(&[Experiment]) -> Result<EquationsEstimate, Error>,
+    monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
     if model.parameters().is_empty() {
         return Err(Error::argument(
@@ -210,10 +231,17 @@ fn fit(
     let shares = Shares::of(&plan.estimate, &plan.validate, plan.split, log.rows())?;
     let fitted_to = experiments(model, log, &shares.estimation, &shares.estimation)?;
     let found = search(&fitted_to)?;
-    let Errors { nis, mse } = errors(model, &fitted_to, &found)?;
+    let Errors { nis, mse, noise } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
+    let profile = if plan.profile {
+        let ends = intervals(model, &fitted_to, &found, factor, &plan.search, monitor)?;
+        let named = model.unknown().zip(ends);
+        named.map(|(name, [low, high])| ProfileInterval { name: name.to_owned(), low, high }).collect()
+    } else {
+        Vec::new()
+    };
     let covariance = found.covariance.row_iter().map(|row| row.iter().map(|value| value * factor).collect());
-    let fitted = EquationsModel::new(model, &found.values, covariance.collect());
+    let fitted = EquationsModel::new(model, &found.values, covariance.collect(), &noise);
 
     let segments = fitted_to.iter().flat_map(|experiment| {
         let rows = experiment.counted().iter();
@@ -232,6 +260,7 @@ fn fit(
             nis,
             covariance_factor: factor,
             unknown: unknown.collect(),
+            profile,
             starts: own.starts(),
             search: found.search,
         }),
@@ -272,6 +301,8 @@ struct Errors {
     nis: Option<NisSummary>,
     /// The mean of (y - h(x^))^2.
     mse: f64,
+    /// The mean variance of the noise of each output.
+    noise: Vec<f64>,
 }
 
 fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate) -> Result<Errors, Error> {
@@ -279,6 +310,7 @@ fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate
     let mut row = None;
     let (mut nis, mut measured) = (0.0, 0);
     let mut squares = 0.0;
+    let mut noise = vec![(0.0, 0.0); model.outputs().len()];
     let mut add = |nis: f64, measured: usize| {
         if let Some(bounds) = chi_square_interval(measured) {
             count.add(nis, measured, bounds);
@@ -291,9 +323,12 @@ fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate
         }
         nis += innovation.error * innovation.error / innovation.variance;
         measured += 1;
+        noise[at.output].0 += innovation.noise;
+        noise[at.output].1 += 1.0;
         squares += (experiments[at.log].output(at.row)[at.output] - prediction).powi(2);
     })
     .map_err(|failure| failure.error(experiments))?;
     add(nis, measured);
-    Ok(Errors { nis: count.summary(), mse: squares / found.samples as f64 })
+    let noise = noise.into_iter().map(|(sum, count)| if count == 0.0 { 0.0 } else { sum / count }).collect();
+    Ok(Errors { nis: count.summary(), mse: squares / found.samples as f64, noise })
 }

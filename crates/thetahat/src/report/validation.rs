@@ -5,9 +5,10 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+use thetahat_numerics::distribution::chi_square_tail;
 use thetahat_numerics::regression::sum;
 
-pub use document::{Comparison, Coverage, InSample, NoiseLevel, Validation};
+pub use document::{Comparison, Coverage, InSample, LikelihoodRatio, NoiseLevel, Validation};
 pub use options::{Offsets, ValidationOptions};
 
 use super::Report;
@@ -83,6 +84,8 @@ struct FittedTo {
     outputs: Vec<Vec<String>>,
     samples: usize,
     criteria: Criteria,
+    /// Of a model in equations the logarithm of the likelihood, and the parameters that were fitted.
+    likelihood: Option<(f64, Vec<String>)>,
 }
 
 /// Measured and predicted signals, one value for each row of the log, in the log's own units; NaN where there is none.
@@ -295,6 +298,10 @@ pub fn validate(
         outputs: report.data.digests.iter().map(digest).collect(),
         samples: report.estimation.samples,
         criteria: report.estimation.criteria,
+        likelihood: report.estimation.procedure.equations().map(|outcome| {
+            let names = outcome.unknown.iter().map(|unknown| unknown.name.clone());
+            (outcome.log_likelihood, names.collect())
+        }),
     };
     Ok(Validated { validation, signals, fitted })
 }
@@ -598,7 +605,30 @@ pub fn compare(validated: &[Validated]) -> Result<Comparison, Error> {
         models: validated.iter().map(|validated| validated.validation.clone()).collect(),
         criteria: comparable(validated)
             .then(|| validated.iter().map(|validated| validated.fitted.criteria).collect()),
+        likelihood_ratios: likelihood_ratios(validated),
     })
+}
+
+/// Of all pairs of models in equations, fitted to the same values, of which the parameters of one are among those of the
+/// other.
+fn likelihood_ratios(validated: &[Validated]) -> Vec<LikelihoodRatio> {
+    let pairs = (0..validated.len()).flat_map(|one| (0..validated.len()).map(move |other| (one, other)));
+    let ratio = |(smaller, larger): (usize, usize)| {
+        let (one, other) = (&validated[smaller].fitted, &validated[larger].fitted);
+        let ((low, few), (high, many)) = one.likelihood.as_ref().zip(other.likelihood.as_ref())?;
+        let further: Vec<String> = many.iter().filter(|name| !few.contains(name)).cloned().collect();
+        let is_nested = few.iter().all(|name| many.contains(name)) && !further.is_empty();
+        let same = one.samples == other.samples && one.outputs == other.outputs;
+        let ratio = (2.0 * (high - low)).max(0.0);
+        (is_nested && same).then(|| LikelihoodRatio {
+            smaller,
+            larger,
+            ratio,
+            p_value: chi_square_tail(ratio, further.len() as f64).unwrap_or(1.0),
+            parameters: further,
+        })
+    };
+    pairs.filter_map(ratio).collect()
 }
 
 /// Whether all models were fitted to the same values of the same outputs, and about as many of them count.

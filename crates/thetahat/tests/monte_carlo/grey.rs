@@ -94,3 +94,78 @@ fn intervals_of_models_in_equations_cover_the_truth() {
         assert!((square - 1.0).abs() < 0.35 * spread, "{noise}: {square}");
     }
 }
+
+/// A room of one state, in hours, K and kW: what is outside goes in lines, the heating is held, and both noises are
+/// unknown.
+const ROOM: &str = "\
+sample_time = 0.5
+
+[states]
+room = { start = 20, sd = 0.2 }
+
+[inputs]
+outside = { channel = 'to', hold = 'linear' }
+heating = 'q'
+
+[parameters]
+r = { start = 4, sd = 4, unknown = true, min = 0 }
+c = { start = 2, sd = 2, unknown = true, min = 0 }
+
+[derivative]
+room = '((outside - room) / r + heating) / c'
+
+[outputs]
+y = 'room'
+
+[noise]
+process = { room = { start = 0.05, unknown = true } }
+measurement = { y = { start = 0.2, unknown = true } }
+";
+
+const OF_ROOM: [f64; 4] = [8.0, 0.6, 0.1, 0.06];
+
+/// The exact solution from row to row, and the exact variance of its noise.
+fn room(seed: u64) -> Log {
+    let [r, c, process, measurement] = OF_ROOM;
+    let mut random = Random::new(seed);
+    let (h, a) = (0.5, 1.0 / (r * c));
+    let kept = (-a * h).exp();
+    // (1 - e^(-a h))/a, and the integral of it.
+    let (once, twice) = ((1.0 - kept) / a, (h - (1.0 - kept) / a) / a);
+    let spread = (process * process / h * (1.0 - kept * kept) / (2.0 * a)).sqrt();
+    let weather = |row: usize| 5.0 + 4.0 * (row as f64 * h / 24.0 * std::f64::consts::TAU).sin();
+    let mut state = 20.0 + 0.2 * random.normal();
+    let mut channels = ["to", "q", "y"].map(|name| Channel { name: name.into(), values: Vec::new() });
+    for row in 0..500 {
+        let heating = if row * 7 % 23 < 11 { 3.0 } else { 0.5 };
+        let values = [weather(row), heating, state + measurement * random.normal()];
+        channels.iter_mut().zip(values).for_each(|(channel, value)| channel.values.push(value));
+        let driven = a * weather(row) + heating / c;
+        let rise = a * (weather(row + 1) - weather(row)) / h;
+        state = kept * state + once * driven + twice * rise + spread * random.normal();
+    }
+    Log::new(channels.into(), h).expect("the case is sound")
+}
+
+#[test]
+fn intervals_of_plants_and_noises_cover_the_truth() {
+    let model = GreyBox::from_toml(ROOM).expect("the case is sound");
+    let runs = runs(40);
+    let mut covered = [0_usize; 4];
+    for seed in 0..runs as u64 {
+        let (log, plan) = (room(500 + seed), EquationsPlan::default());
+        let found = fit_equations(&model, &log, &[], &plan, &|_| ControlFlow::Continue(()))
+            .expect("the case is sound");
+        for ((parameter, truth), covered) in found.model.parameters().iter().zip(OF_ROOM).zip(&mut covered) {
+            let error = parameter.standard_error.expect("it has one");
+            *covered += usize::from((parameter.value - truth).abs() < 1.959964 * error);
+        }
+    }
+    let shares = covered.map(|covered| covered as f64 / runs as f64);
+    eprintln!("r, c, process, measurement: {:.1?} %", shares.map(|share| 100.0 * share));
+    // With 200 runs the standard deviation of a share is 1.5 %.
+    let spread = (200.0 / runs as f64).sqrt();
+    for share in shares {
+        assert!((share - 0.95).abs() < 0.05 * spread, "{shares:?}");
+    }
+}

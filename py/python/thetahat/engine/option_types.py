@@ -512,6 +512,9 @@ class EquationsOptions(TypedDict, total=False):
     starts
         Search from this many further starts [default: 0, with ``narx`` 4, with ``grey`` some where the first
         one fails]
+    profile
+        Add intervals of 95 % by profile likelihood, which know bounds and curvature; some twenty searches
+        for each parameter
     seed
         The seed of random starts and of random centres [default: 0]
     time_limit
@@ -526,6 +529,7 @@ class EquationsOptions(TypedDict, total=False):
     tolerance: Optional[float]
     step: Optional[Union[float, tuple[float, float]]]
     starts: Optional[int]
+    profile: Optional[bool]
     seed: Optional[int]
     time_limit: Optional[float]
 

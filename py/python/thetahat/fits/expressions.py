@@ -217,6 +217,42 @@ def table(x: Any, knots: Iterable[Any], values: Iterable[Any], *, method: Litera
     return Expression(f"{words[method]}({text_of(x)}; {pairs})")
 
 
+def delayed(x: Any, delay: Any) -> Expression:
+    """An input some seconds ago, in the functions of a model in equations.
+
+    Parameters
+    ----------
+    x : Expression
+        The input, such as ``u.flow``. Before the first row it is as in it. One that is held is taken over a step as its mean, so that the
+        delay need not be a whole number of samples.
+    delay : float or Expression
+        Seconds, a number or made of parameters, unknown ones too.
+
+    Returns
+    -------
+    Expression
+
+    Examples
+    --------
+    >>> import thetahat as th
+    >>> pipe = th.GreyBox.from_functions(
+    ...     sample_time=1,
+    ...     states={"outlet": (20, 0.1)},
+    ...     inputs={"inlet": "t_in"},
+    ...     parameters={"delay": {"start": 3, "sd": 2, "unknown": True, "min": 0, "max": 30}},
+    ...     derivative=lambda x, u, p: {"outlet": (th.delayed(u.inlet, p.delay) - x.outlet) / 5},
+    ...     outputs=lambda x, u, p: {"y": x.outlet},
+    ...     measurement={"y": 0.1},
+    ... )
+    >>> pipe.to_dict()["derivative"]["outlet"]
+    '((inlet(t - (delay)) - outlet) / 5.0)'
+    """
+    name = text_of(x)
+    if not name.isidentifier():
+        raise TypeError(f"x: expected an input, such as u.flow, found {name}")
+    return Expression(f"{name}(t - ({text_of(delay)}))")
+
+
 def _interp(
     x: Any, xp: Iterable[Any], fp: Iterable[Any], left: Any = None, right: Any = None, period: Any = None
 ) -> Expression:

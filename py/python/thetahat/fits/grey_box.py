@@ -78,14 +78,14 @@ class GreyBox(Simulates):
         cls,
         *,
         sample_time: float,
-        states: Mapping[str, Mapping[str, float] | tuple[float, float]],
+        states: Mapping[str, Mapping[str, float | str] | tuple[float | str, float | str]],
         outputs: Callable[..., Mapping[str, Any]],
-        measurement: Mapping[str, float],
+        measurement: Mapping[str, Any] | Callable[..., Mapping[str, Any]],
         derivative: Callable[..., Mapping[str, Any]] | None = None,
         next: Callable[..., Mapping[str, Any]] | None = None,
-        inputs: Sequence[str] | Mapping[str, str] = (),
+        inputs: Sequence[str] | Mapping[str, str | Mapping[str, str]] = (),
         parameters: Mapping[str, Any] | None = None,
-        process: Mapping[str, float] | None = None,
+        process: Mapping[str, Any] | Callable[..., Mapping[str, Any]] | None = None,
         substeps: int | None = None,
     ) -> GreyBox:
         """A model whose equations are functions of Python.
@@ -98,21 +98,23 @@ class GreyBox(Simulates):
         sample_time : float
             Seconds from one sample to the next.
         states : dict of str to (float, float) or dict
-            Of each state what is known at the first row: its value and its standard deviation.
+            Of each state what is known at the first row: its value and its standard deviation, as numbers or as texts with parameters.
         outputs : callable
             ``outputs(x, u, p)`` gives a dict of the channels that are measured: what each is.
-        measurement : dict of str to float
-            The standard deviation of each output's noise.
+        measurement : dict, or callable
+            The standard deviation of each output's noise: a number, or ``{"start": 0.1, "unknown": True}`` for one that a fit finds; or a
+            function ``measurement(x, u, p)`` that gives a dict of expressions.
         derivative, next : callable
             One of the two. ``derivative(x, u, p)`` gives a dict of dx/dt; ``next(x, u, p, dt)`` one of the states after ``dt`` seconds.
             ``x``, ``u`` and ``p`` have the states, inputs and parameters as attributes, in their order as ``x[0]``, and by name as
             ``x["level"]``. They take part in NumPy's functions; `thetahat.where` is their ``if``, `thetahat.table` a look-up table.
         inputs : sequence of str, or dict of str to str
-            The channels that are inputs, or by the names that the functions use.
+            The channels that are inputs, or by the names that the functions use. ``{"channel": "to", "hold": "linear"}`` in place of a
+            channel goes from row to row in straight lines; `thetahat.delayed` is an input some seconds ago.
         parameters : dict of str to float or dict
             A number, or what is known of an unknown one: ``{"start": 1, "sd": 1, "unknown": True, "min": 0}``.
-        process : dict of str to float, optional
-            The standard deviation of what a sample adds to each state.
+        process : dict, or callable, optional
+            The standard deviation of what a sample adds to each state, as for ``measurement``.
         substeps : int, optional
             Steps of the integration from row to row, of ``derivative``.
 
@@ -139,7 +141,7 @@ class GreyBox(Simulates):
         """
         if (derivative is None) == (next is None):
             raise ValueError("derivative: give one of derivative and next")
-        channels = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
+        channels: dict[str, Any] = dict(inputs) if isinstance(inputs, Mapping) else {name: name for name in inputs}
         known = dict(parameters or {})
 
         spaces = (Names("state", states), Names("input", channels), Names("parameter", known))
@@ -160,7 +162,10 @@ class GreyBox(Simulates):
             written["next"] = Written("next", next)
             model["next"] = written["next"].equations(*spaces, Expression("dt"), of=list(states))
         model["outputs"] = written["outputs"].equations(*spaces)
-        model["noise"] = {"process": dict(process or {}), "measurement": dict(measurement)}
+        noises = {"process": process or {}, "measurement": measurement}
+        model["noise"] = {
+            name: Written(name, noise).equations(*spaces) if callable(noise) else dict(noise) for name, noise in noises.items()
+        }
         text = _toml(_plain("model", model))
         try:
             return cls(text)

@@ -139,7 +139,9 @@ impl Likelihood for LikelihoodObjective<'_> {
         let size = self.slopes.gradient.len();
         self.slopes.clear();
         for (log, experiment) in self.experiments.iter().enumerate() {
-            self.lanes.iter_mut().for_each(|lane| lane.restart(self.model));
+            for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
+                lane.restart(self.model, variables);
+            }
             for row in 0..experiment.rows() {
                 let failure = Failure { log, row };
                 if !experiment.counts(row) {
@@ -151,8 +153,7 @@ impl Likelihood for LikelihoodObjective<'_> {
                 for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
                     reach(self.model, experiment, lane, variables, row);
                 }
-                let variances = self.model.measurement_variances().iter();
-                for (index, (&measured, &noise)) in experiment.output(row).iter().zip(variances).enumerate() {
+                for (index, &measured) in experiment.output(row).iter().enumerate() {
                     if measured.is_nan() {
                         continue;
                     }
@@ -160,7 +161,7 @@ impl Likelihood for LikelihoodObjective<'_> {
                     let slopes =
                         self.error_slopes.chunks_mut(LANE).zip(self.variance_slopes.chunks_mut(LANE));
                     for (lane, (by_error, by_variance)) in self.lanes.iter_mut().zip(slopes) {
-                        let innovation = lane.absorb(index, measured, noise).ok_or(failure)?;
+                        let innovation = lane.absorb(index, measured).ok_or(failure)?;
                         (error, variance) = (innovation.error.value, innovation.variance.value);
                         by_error.copy_from_slice(&innovation.error.derivatives[..by_error.len()]);
                         by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);

@@ -39,8 +39,16 @@ pub(super) struct Deviance<L> {
 
 impl<L: Likelihood> Deviance<L> {
     pub(super) fn new(model: &GreyBox, criterion: L) -> Self {
-        let bounded: Vec<bool> =
-            model.parameters().iter().map(|unknown| unknown.scale != Scale::Free).collect();
+        Self::of(model.parameters().iter().map(|unknown| unknown.scale != Scale::Free).collect(), criterion)
+    }
+
+    /// The same of all parameters but one.
+    pub(super) fn without(model: &GreyBox, index: usize, criterion: L) -> Self {
+        let others = model.parameters().iter().enumerate().filter(|(place, _)| *place != index);
+        Self::of(others.map(|(_, unknown)| unknown.scale != Scale::Free).collect(), criterion)
+    }
+
+    fn of(bounded: Vec<bool>, criterion: L) -> Self {
         let size = bounded.len();
         Self {
             criterion,

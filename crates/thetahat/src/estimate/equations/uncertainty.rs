@@ -17,7 +17,8 @@ const PART: f64 = 0.1;
 const AWAY: f64 = 1e6;
 
 /// The covariance of the parameters in their own units, `slopes` being dp/dz, and the condition of the problem: the
-/// ratio of the longest to the shortest direction of the information's root with a unit diagonal.
+/// ratio of the longest to the shortest direction of the information's root with a unit diagonal. Parameters that are
+/// `fixed` have none: their rows and columns are 0.
 ///
 /// # Errors
 /// [`Error::Undetermined`] that names the parameters of a singular information.
@@ -25,8 +26,33 @@ pub(super) fn covariance(
     information: &[f64],
     slopes: &[f64],
     names: &[String],
+    fixed: &[bool],
+) -> Result<(DMatrix<f64>, f64), Error> {
+    let all = names.len();
+    let open: Vec<usize> = (0..all).filter(|index| !fixed[*index]).collect();
+    let part: Vec<f64> =
+        open.iter().flat_map(|&i| open.iter().map(move |&j| information[i * all + j])).collect();
+    let own = |index: &usize| (slopes[*index], names[*index].clone());
+    let (slopes, names): (Vec<f64>, Vec<String>) = open.iter().map(own).unzip();
+    let (found, condition) = free_covariance(&part, &slopes, &names)?;
+    let mut covariance = DMatrix::zeros(all, all);
+    for (i, &row) in open.iter().enumerate() {
+        for (j, &column) in open.iter().enumerate() {
+            covariance[(row, column)] = found[(i, j)];
+        }
+    }
+    Ok((covariance, condition))
+}
+
+fn free_covariance(
+    information: &[f64],
+    slopes: &[f64],
+    names: &[String],
 ) -> Result<(DMatrix<f64>, f64), Error> {
     let size = names.len();
+    if size == 0 {
+        return Ok((DMatrix::zeros(0, 0), 1.0));
+    }
     let matrix = DMatrix::from_row_slice(size, size, information);
     let without: Vec<String> =
         named(names, |index| matrix[(index, index)].is_nan() || matrix[(index, index)] <= 0.0);

@@ -12,7 +12,8 @@
 
 use super::super::program::{Array, Condition, Entry, Index, Kind, Program, Statement, Value};
 use super::super::signals::{Innovations, PREDICTION, Signals};
-use super::{Run, multiplied};
+use super::translation::translated;
+use super::{Compiled, Run, multiplied, stored};
 use crate::model::equations::GreyBox;
 
 /// The filter, and its memory.
@@ -27,16 +28,52 @@ pub(super) struct Kalman<'e> {
     gain: Array,
     /// How far the outputs of the sample have moved the state.
     moved: Array,
-    q: Array,
-    r: Array,
+    q: Variances<'e>,
+    r: Variances<'e>,
+}
+
+/// Variances: numbers, or what is computed in each sample, after it is known at what state and inputs.
+#[derive(Clone, Copy)]
+struct Variances<'e> {
+    array: Array,
+    computed: Option<&'e Compiled>,
+}
+
+impl<'e> Variances<'e> {
+    fn new(
+        program: &mut Program,
+        (compiled, is_constant): (&'e Compiled, bool),
+        count: usize,
+        [name, doc]: [&str; 2],
+    ) -> Self {
+        if is_constant {
+            let array = program.table(&name.to_uppercase(), doc, compiled.constants());
+            return Self { array, computed: None };
+        }
+        Self { array: program.memory(name, doc, vec![0.0; count]), computed: Some(compiled) }
+    }
+
+    fn at(&self, index: Index) -> Value {
+        self.array.at(index)
+    }
+
+    /// Computes what is not the same in all samples.
+    fn computed(&self, program: &mut Program, run: &Run<'_>) -> Vec<Statement> {
+        let Some(compiled) = self.computed else { return Vec::new() };
+        let leaves = run.leaves(run.x, None, None, 0.0);
+        let (mut statements, results) = translated(program, compiled, compiled.results(), &leaves);
+        statements.extend(stored(self.array, results));
+        statements
+    }
 }
 
 impl<'e> Kalman<'e> {
-    pub(super) fn new(program: &mut Program, equations: &GreyBox, run: Run<'e>) -> Self {
+    pub(super) fn new(program: &mut Program, equations: &'e GreyBox, run: Run<'e>) -> Self {
         let (n, m) = (run.states, run.outputs);
-        let (deviations, mut p) = (equations.start().1, vec![0.0; n * n]);
-        p.iter_mut().step_by(n + 1).zip(deviations).for_each(|(own, deviation)| *own = deviation * deviation);
-        let q = equations.process_variances(run.sample_time).collect();
+        let (_, variances, _) = equations.started();
+        let mut p = vec![0.0; n * n];
+        p.iter_mut().step_by(n + 1).zip(variances).for_each(|(own, variance)| *own = variance);
+        let [q, r] = equations.compiled_variances();
         let mut zeros = |name: &str, doc: &str, size: usize| program.memory(name, doc, vec![0.0; size]);
         let work = zeros("work", "What is half of a product.", n * n);
         let said = zeros("said", "The outputs as predicted.", m);
@@ -50,12 +87,17 @@ impl<'e> Kalman<'e> {
             h,
             gain,
             moved,
-            q: program.table("Q", "What noise adds to the variances of the states in a sample.", q),
-            r: program.table(
-                "R",
-                "The variances of the outputs.",
-                equations.measurement_variances().to_vec(),
-            ),
+            q: match equations.exact_matrices() {
+                Some([.., q]) => {
+                    let doc = "What noise adds to the covariance of the state in a sample, row by row.";
+                    Variances { array: program.table("Q", doc, q), computed: None }
+                }
+                None => {
+                    let doc = "What noise adds to the variances of the states in a sample.";
+                    Variances::new(program, q, n, ["q", doc])
+                }
+            },
+            r: Variances::new(program, r, m, ["r", "The variances of the outputs."]),
             run,
         }
     }
@@ -63,7 +105,7 @@ impl<'e> Kalman<'e> {
     /// Takes the inputs, and keeps what the outputs should be.
     fn predicted(&self, program: &mut Program, signals: &Signals) -> Vec<Statement> {
         let (n, m) = (self.run.states, self.run.outputs);
-        let mut body = self.run.take_inputs(program, signals);
+        let mut body = self.run.begin(program, signals, |program| self.advanced(program));
         let (statements, mut results) = self.run.observed(program, m + m * n);
         let columns = results.split_off(m);
         body.extend(statements);
@@ -81,9 +123,10 @@ impl<'e> Kalman<'e> {
         signals: &Signals,
         told: Option<Innovations>,
     ) -> Vec<Statement> {
-        let Self { run, p, work, said, h, gain, moved, r, .. } = *self;
+        let Self { ref run, p, work, said, h, gain, moved, r, .. } = *self;
         let (n, x) = (run.states, run.x);
-        let mut body = program.repeat(n, |_, i| vec![Statement::Store(moved, i, 0.0.into())]);
+        let mut body = r.computed(program, run);
+        body.extend(program.repeat(n, |_, i| vec![Statement::Store(moved, i, 0.0.into())]));
         let [error, variance, sum, share] =
             ["error", "variance", "total", "share"].map(|name| program.variable(name));
         body.extend(told.map(|told| told.begin()));
@@ -148,7 +191,8 @@ impl<'e> Kalman<'e> {
     fn advanced(&self, program: &mut Program) -> Vec<Statement> {
         let Self { run, p, work, q, .. } = self;
         let n = run.states;
-        let mut body = run.advance(program);
+        let mut body = q.computed(program, run);
+        body.extend(run.advance(program));
         if let Some(derivatives) = run.derivatives {
             body.extend(multiplied(program, n, [derivatives.m, *p, *work], false));
             body.extend(multiplied(program, n, [*work, derivatives.m, *p], true));
@@ -161,11 +205,17 @@ impl<'e> Kalman<'e> {
                 vec![Statement::Store(*p, i.entry(n, &k), both * 0.5)]
             })
         }));
-        body.extend(program.repeat(n, |_, i| {
-            let own = i.entry(n, &i);
-            vec![Statement::Store(*p, own.clone(), p.at(own) + q.at(i))]
-        }));
-        body.extend(run.finish());
+        if run.exact.is_some() {
+            body.extend(
+                program
+                    .repeat(n * n, |_, i| vec![Statement::Store(*p, i.clone(), p.at(i.clone()) + q.at(i))]),
+            );
+        } else {
+            body.extend(program.repeat(n, |_, i| {
+                let own = i.entry(n, &i);
+                vec![Statement::Store(*p, own.clone(), p.at(own) + q.at(i))]
+            }));
+        }
         body
     }
 
@@ -174,7 +224,7 @@ impl<'e> Kalman<'e> {
         predict
             .extend(program.repeat(self.run.outputs, |_, j| vec![signals.say(&j, self.said.at(j.clone()))]));
         let mut update = self.corrected(program, signals, None);
-        update.extend(self.advanced(program));
+        update.extend(self.run.end(program, |program| self.advanced(program)));
         let doc =
             "What was measured in this sample, after its prediction. What is missing (NaN) corrects nothing.";
         vec![signals.responds("predict", PREDICTION, predict), signals.updates(doc, update)]
@@ -187,7 +237,7 @@ impl<'e> Kalman<'e> {
         body.extend(self.corrected(program, signals, Some(told)));
         let state = program.array(Kind::Result, "state", "The state.", vec![0.0; n]);
         body.extend(program.repeat(n, |_, i| vec![Statement::Store(state, i.clone(), x.at(i))]));
-        body.extend(self.advanced(program));
+        body.extend(self.run.end(program, |program| self.advanced(program)));
         let doc = "A sample: takes u(k) and y(k), and gives the estimate of the state x(k) from all measurements up to them. What is missing (NaN) corrects nothing.";
         signals.observes(doc, Some(state), body)
     }

@@ -10,11 +10,17 @@ use crate::model::equations::{Function as Named, Operation, Program as Compiled,
 const PRODUCTS: i32 = 8;
 
 /// What the leaves of equations stand for.
-pub(super) struct Leaves {
+pub(super) struct Leaves<'a> {
     pub(super) states: Array,
     pub(super) inputs: Option<Array>,
+    /// The inputs of the next sample and how much of the way there has gone by, for those that go in lines.
+    pub(super) ahead: Option<(Array, Value)>,
+    pub(super) lines: &'a [bool],
+    /// Of each input that acts later, what it was in the latest samples.
+    pub(super) pasts: &'a [Option<Array>],
     pub(super) time: Option<Value>,
     pub(super) step: f64,
+    pub(super) sample_time: f64,
 }
 
 /// The statements that the first `count` results of a program need, and these results. What is used once stands where
@@ -23,7 +29,7 @@ pub(super) fn translated(
     program: &mut Program,
     compiled: &Compiled,
     count: usize,
-    leaves: &Leaves,
+    leaves: &Leaves<'_>,
 ) -> (Vec<Statement>, Vec<Value>) {
     let (operations, results) = compiled.first(count);
     let mut uses: HashMap<usize, usize> = HashMap::new();
@@ -48,7 +54,7 @@ pub(super) fn translated(
 
 struct Translation<'a> {
     program: &'a mut Program,
-    leaves: &'a Leaves,
+    leaves: &'a Leaves<'a>,
     tables: &'a [Arc<Table>],
     values: HashMap<usize, Value>,
     statements: Vec<Statement>,
@@ -79,7 +85,17 @@ impl Translation<'_> {
         match operation {
             Operation::Constant(bits) => f64::from_bits(bits).into(),
             Operation::State(state) => self.leaves.states.at(state),
-            Operation::Input(input) => self.leaves.inputs.map_or(f64::NAN.into(), |inputs| inputs.at(input)),
+            Operation::Input(input) => {
+                let Some(now) = self.leaves.inputs.map(|inputs| inputs.at(input)) else {
+                    return f64::NAN.into();
+                };
+                let is_line = self.leaves.lines.get(input).copied().unwrap_or(false);
+                match self.leaves.ahead.clone().filter(|_| is_line) {
+                    Some((ahead, share)) => now.clone() + (ahead.at(input) - now) * share,
+                    None => now,
+                }
+            }
+            Operation::Delayed(input, order, delay) => self.delayed(input, order, delay),
             // The parameters of a fitted model are constants.
             Operation::Parameter(_) => f64::NAN.into(),
             Operation::Time => self.leaves.time.clone().unwrap_or(Value::Number(f64::NAN)),
@@ -126,6 +142,23 @@ impl Translation<'_> {
                 let x = self.at(x);
                 self.applied(function, x)
             }
+        }
+    }
+
+    /// An input that is held, as its mean over the sample a delay ago: (1 - phi) u(k - d) + phi u(k - d - 1), the delay
+    /// being d + phi samples.
+    fn delayed(&mut self, input: usize, order: u8, delay: usize) -> Value {
+        let (Some(Some(past)), Value::Number(delay)) = (self.leaves.pasts.get(input), self.at(delay)) else {
+            return f64::NAN.into();
+        };
+        let samples = delay / self.leaves.sample_time;
+        let (whole, part) = (samples.floor(), samples.fract());
+        let last = self.program.length(*past).saturating_sub(1);
+        let [now, before] = [0, 1].map(|more| past.at(last.saturating_sub(whole as usize + more)));
+        match order {
+            0 if part == 0.0 => now,
+            0 => now * (1.0 - part) + before * part,
+            _ => (before - now) / self.leaves.sample_time,
         }
     }
 

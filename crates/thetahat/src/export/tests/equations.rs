@@ -11,7 +11,7 @@ fn model(text: &str) -> Model {
     let values = vec![0.7; model.unknown().count()];
     let covariance =
         (0..values.len()).map(|i| (0..values.len()).map(|j| f64::from(u8::from(i == j))).collect()).collect();
-    EquationsModel::new(&model, &values, covariance).into()
+    EquationsModel::new(&model, &values, covariance, &model.measurement_variances_at_start()).into()
 }
 
 #[test]

@@ -7,6 +7,7 @@ use thetahat_numerics::noise::Noise;
 
 use super::filter;
 use crate::filter::{Estimator, StateEstimate, StateFilter, StateModel};
+use crate::model::equations::{Drive, Work};
 use crate::model::{
     GreyBox,
     equations::tests::{CART, PENDULUM},
@@ -102,7 +103,16 @@ impl Parametric<'_> {
         let (n, dt) = (x.len(), self.0.sample_time());
         let (mut next, mut by) = (Vector::zeros(n), Matrix::zeros(n, n + z.len()));
         let (values, jacobian) = (next.as_mut_slice(), by.as_mut_slice());
-        self.0.advance(x.as_slice(), z.as_slice(), u.as_slice(), 0.0, dt, values, jacobian, &mut Vec::new());
+        self.0.advance(
+            x.as_slice(),
+            z.as_slice(),
+            Drive::held(u.as_slice()),
+            0.0,
+            dt,
+            values,
+            jacobian,
+            &mut Work::new(),
+        );
         (next, by)
     }
 
@@ -110,7 +120,15 @@ impl Parametric<'_> {
         let m = self.0.outputs().len();
         let (mut y, mut by) = (Vector::zeros(m), Matrix::zeros(m, x.len() + z.len()));
         let (values, jacobian) = (y.as_mut_slice(), by.as_mut_slice());
-        self.0.observe(x.as_slice(), z.as_slice(), u.as_slice(), 0.0, values, jacobian, &mut Vec::new());
+        self.0.observe(
+            x.as_slice(),
+            z.as_slice(),
+            Drive::held(u.as_slice()),
+            0.0,
+            values,
+            jacobian,
+            &mut Work::new(),
+        );
         (y, by)
     }
 }
@@ -125,9 +143,12 @@ impl ParametricTransition<f64, Dyn, Dyn, Dyn> for Parametric<'_> {
     fn next_parameter_jacobian(&self, x: &Vector, z: &Vector, u: &Vector) -> Matrix {
         self.step(x, z, u).1.columns(x.len(), z.len()).into_owned()
     }
-    fn process_noise(&self, x: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
-        let variances = self.0.process_variances(self.0.sample_time());
-        Covariance::from_diagonal(&Vector::from_iterator(x.len(), variances)).unwrap()
+    fn process_noise(&self, x: &Vector, z: &Vector, u: &Vector) -> Covariance<f64, Dyn> {
+        let (mut variances, dt) = (Vector::zeros(x.len()), self.0.sample_time());
+        let [x, z, u] = [x, z, u].map(|vector| vector.as_slice());
+        let u = Drive::held(u);
+        self.0.added_variances(x, z, u, 0.0, dt, variances.as_mut_slice(), &mut Work::new());
+        Covariance::from_diagonal(&variances).unwrap()
     }
 }
 
@@ -142,7 +163,7 @@ impl ParametricObservation<f64, Dyn, Dyn, Dyn, Dyn> for Parametric<'_> {
         self.seen(x, z, u).1.columns(x.len(), z.len()).into_owned()
     }
     fn measurement_noise(&self, _: &Vector, _: &Vector, _: &Vector) -> Covariance<f64, Dyn> {
-        Covariance::from_diagonal(&Vector::from_column_slice(self.0.measurement_variances())).unwrap()
+        Covariance::from_diagonal(&Vector::from_vec(self.0.measurement_variances_at_start())).unwrap()
     }
 }
 
@@ -150,10 +171,10 @@ impl ParametricObservation<f64, Dyn, Dyn, Dyn, Dyn> for Parametric<'_> {
 fn unknown_parameters_are_those_of_an_augmented_model() {
     let text = PENDULUM.replace("bias * cos(t)", "bias");
     let model = GreyBox::from_toml(&text).unwrap();
-    let (x, deviations) = model.start();
+    let (x, variances, _) = model.started();
     let starts: Vec<(f64, f64)> = model.parameters().iter().map(|p| p.start_variable()).collect();
     let mean: Vec<f64> = x.iter().copied().chain(starts.iter().map(|start| start.0)).collect();
-    let variances = deviations.iter().copied().chain(starts.iter().map(|start| start.1)).map(|sd| sd * sd);
+    let variances = variances.iter().copied().chain(starts.iter().map(|start| start.1 * start.1));
     let prior = Covariance::from_diagonal(&Vector::from_iterator(6, variances)).unwrap();
     let mut reference = ExtendedKalmanFilter::new(mean.into(), prior).unwrap();
     let walks = Vector::from_iterator(4, model.parameters().iter().map(|p| p.walk_variable().powi(2)));

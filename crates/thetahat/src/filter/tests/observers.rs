@@ -4,6 +4,7 @@ use thetahat_core::{Action, Covariance, LinearObservation, LinearTransition, Lue
 use super::filter;
 use crate::filter::{Estimator, ObserverGain, StateFilter, StateModel};
 use crate::model::GreyBox;
+use crate::model::equations::{Drive, Work};
 use crate::tests::assert_refused;
 
 const CART: &str = "\
@@ -92,7 +93,7 @@ fn poles_are_placed_again_where_a_model_bends() {
         let estimate = filter.step(None, &[], &[output]).unwrap();
         errors.push((estimate.predicted.values[0] - truth[0]).hypot(estimate.predicted.values[1] - truth[1]));
         let (mut next, mut jacobian) = ([0.0; 2], [0.0; 4]);
-        model.advance(&truth, &[], &[], 0.0, 0.02, &mut next, &mut jacobian, &mut Vec::new());
+        model.advance(&truth, &[], Drive::held(&[]), 0.0, 0.02, &mut next, &mut jacobian, &mut Work::new());
         truth = next;
     }
     assert!(errors[0] > 0.5 && errors[199] < 1e-9, "{} {}", errors[0], errors[199]);

@@ -1,6 +1,7 @@
 //! Expressions of channels, such as sqrt(u): what a nonlinear ARX model reads beside the channels themselves.
 
 use super::document::quoted;
+use super::drive::Drive;
 use super::expression::{self, Names};
 use super::graph::{Graph, Leaves, Node, Operation};
 use super::program::Program;
@@ -82,7 +83,7 @@ fn run<'b>(
     ExpressionBuffer(values): &'b mut ExpressionBuffer,
 ) -> impl Iterator<Item = f64> + use<'b> {
     values.resize(values.len().max(program.size()), 0.0);
-    let leaves = Leaves { states: &[], parameters: &[], inputs: channels, time: 0.0, step: 0.0 };
+    let leaves = Leaves { inputs: Drive::held(channels), ..Leaves::of_parameters(&[]) };
     program.run(&leaves, values)
 }
 

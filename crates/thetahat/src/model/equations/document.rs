@@ -182,6 +182,16 @@ impl<'d> Entry<'d> {
         }
     }
 
+    /// One of these words.
+    pub(crate) fn one_of(&self, words: &[&str]) -> Result<&'d str, Error> {
+        let word = self.text()?;
+        if words.contains(&word) {
+            return Ok(word);
+        }
+        let near = suggestion(word, words.iter().copied());
+        Err(self.value_error(format!("{} is none of: {}{near}", quoted(word), words.join(", "))))
+    }
+
     /// A text that is not empty.
     pub(crate) fn text(&self) -> Result<&'d str, Error> {
         self.text_of(self.value)

@@ -3,6 +3,8 @@
 use thetahat_core::Number;
 
 use super::GreyBox;
+use super::drive::Drive;
+use super::exact::ExactStep;
 use super::graph::Leaves;
 use super::program::Program;
 
@@ -40,11 +42,43 @@ impl Functions {
 
 /// How the equations of the states lead from one row to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Step {
+pub(crate) enum Step {
     /// They are the next state.
     Next,
     /// They are the derivative of the state, integrated by this number of steps of the classical Runge-Kutta method.
     Integrated(usize),
+    /// They are the derivative of the state, linear in states and inputs, and its noise is always the same: the step is
+    /// exact. Where the derivatives by parameters are asked for, it is integrated in this number of steps.
+    Exact(usize),
+}
+
+/// Numbers to work in, and the last exact step, which is the same from row to row.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Work<S> {
+    numbers: Vec<S>,
+    exact: Option<Kept<S>>,
+}
+
+/// The exact step of some parameters and seconds.
+#[derive(Debug, Clone)]
+struct Kept<S> {
+    parameters: Vec<S>,
+    seconds: f64,
+    step: ExactStep<S>,
+}
+
+impl<S: Number<f64>> Work<S> {
+    pub(crate) const fn new() -> Self {
+        Self { numbers: Vec::new(), exact: None }
+    }
+
+    /// At least this many numbers to work in.
+    pub(super) fn reserve(&mut self, size: usize) -> &mut [S] {
+        if self.numbers.len() < size {
+            self.numbers.resize(size, 0.0.into());
+        }
+        &mut self.numbers
+    }
 }
 
 /// The model for any kind of number, with exact derivatives. `z` are the unknown parameters after the change of
@@ -66,29 +100,33 @@ impl GreyBox {
     /// M_j = M + a_j h K_(j-1)       K_j = A M_j + [0 B]
     /// x <- x + h sum b_j k_j        M <- M + h sum b_j K_j     b = 1/6, 1/3, 1/3, 1/6
     /// ```
+    ///
+    /// Linear equations with noise that is always the same take the [exact](ExactStep) step instead, where the Jacobian
+    /// has no columns for parameters: an estimate of these moves from row to row, and the exact step with it.
     #[expect(clippy::too_many_arguments, reason = "the arguments of f, and where its answers go")]
     pub(crate) fn advance<S: Number<f64>>(
         &self,
         x: &[S],
         z: &[S],
-        u: &[f64],
+        u: Drive<'_>,
         t: f64,
         dt: f64,
         next: &mut [S],
         jacobian: &mut [S],
-        work: &mut Vec<S>,
+        work: &mut Work<S>,
     ) {
         let (n, size) = (next.len(), jacobian.len());
-        let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt };
+        let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt, span: (t, dt) };
         let count = match self.step {
             Step::Next => {
-                let program = reserve(work, self.transition.full.size());
+                let program = work.reserve(self.transition.full.size());
                 return self.transition.run(&leaves, next, jacobian, program);
             }
-            Step::Integrated(count) => count,
+            Step::Exact(_) if size == n * n => return self.exactly(&leaves, next, jacobian, work),
+            Step::Integrated(count) | Step::Exact(count) => count,
         };
         let zero: S = 0.0.into();
-        let rest = reserve(work, self.transition.full.size() + 3 * n + 4 * size);
+        let rest = work.reserve(self.transition.full.size() + 3 * n + 4 * size);
         let (stage, rest) = rest.split_at_mut(n);
         let (rate, rest) = rest.split_at_mut(n);
         let (sum, rest) = rest.split_at_mut(n);
@@ -127,14 +165,129 @@ impl GreyBox {
         }
     }
 
+    /// x + Psi f(x, 0) + X (f(x, dt) - f(x, 0))/dt, and Phi.
+    fn exactly<S: Number<f64>>(
+        &self,
+        leaves: &Leaves<'_, S>,
+        next: &mut [S],
+        jacobian: &mut [S],
+        work: &mut Work<S>,
+    ) {
+        let (n, dt) = (next.len(), leaves.step);
+        self.keep_exact(leaves, dt, work);
+        let program = &self.transition.by_state;
+        let numbers = work.reserve(program.size() + 2 * n);
+        let (rates, rest) = numbers.split_at_mut(n);
+        let (bends, numbers) = rest.split_at_mut(n);
+        for (rate, result) in rates.iter_mut().zip(program.run(leaves, numbers)) {
+            *rate = result;
+        }
+        let is_bent = self.bends;
+        if is_bent {
+            let end = Leaves { time: leaves.time + dt, ..*leaves };
+            for ((bend, result), &rate) in bends.iter_mut().zip(program.run(&end, numbers)).zip(&*rates) {
+                *bend = (result - rate) * (1.0 / dt);
+            }
+        }
+        let Some(Kept { step, .. }) = &work.exact else { return };
+        let (rates, bends) = (&work.numbers[..n], &work.numbers[n..2 * n]);
+        next.copy_from_slice(leaves.states);
+        for (column, &rate) in step.integral.chunks_exact(n).zip(rates) {
+            next.iter_mut().zip(column).for_each(|(next, &entry)| *next += entry * rate);
+        }
+        for (column, &bend) in step.second_integral.chunks_exact(n).zip(bends).filter(|_| is_bent) {
+            next.iter_mut().zip(column).for_each(|(next, &entry)| *next += entry * bend);
+        }
+        jacobian.copy_from_slice(&step.transition);
+    }
+
+    /// Computes the exact step unless it is the last one.
+    fn keep_exact<S: Number<f64>>(&self, leaves: &Leaves<'_, S>, dt: f64, work: &mut Work<S>) {
+        let is_kept = |kept: &Kept<S>| kept.seconds == dt && kept.parameters == leaves.parameters;
+        if work.exact.as_ref().is_some_and(is_kept) {
+            return;
+        }
+        let n = self.states.len();
+        let numbers = work.reserve(self.transition.by_state.size());
+        let a: Vec<S> = self.transition.by_state.run(leaves, numbers).skip(n).collect();
+        let mut intensities = vec![S::from(0.0); n];
+        self.process_variances(leaves, self.sample_time, &mut intensities, work);
+        intensities.iter_mut().for_each(|variance| *variance = *variance * (1.0 / self.sample_time));
+        let step = ExactStep::new(&a, &intensities, dt);
+        work.exact = Some(Kept { parameters: leaves.parameters.to_vec(), seconds: dt, step });
+    }
+
+    /// The covariance U diag(d) U' that noise adds to the state over the same step: U, unit upper triangular, column
+    /// after column, and d. Noise that is added at the end of the step has U = I.
+    #[expect(clippy::too_many_arguments, reason = "what the noise may depend on, and where the answers go")]
+    pub(crate) fn process_noise<S: Number<f64>>(
+        &self,
+        x: &[S],
+        z: &[S],
+        u: Drive<'_>,
+        t: f64,
+        dt: f64,
+        factor: &mut [S],
+        variances: &mut [S],
+        work: &mut Work<S>,
+    ) {
+        let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt, span: (t, dt) };
+        if let Step::Exact(_) = self.step {
+            self.keep_exact(&leaves, dt, work);
+            if let Some(Kept { step, .. }) = &work.exact {
+                factor.copy_from_slice(&step.noise_factor);
+                variances.copy_from_slice(&step.noise_variances);
+            }
+            return;
+        }
+        factor.fill(0.0.into());
+        factor.iter_mut().step_by(variances.len() + 1).for_each(|diagonal| *diagonal = 1.0.into());
+        self.process_variances(&leaves, dt, variances, work);
+    }
+
+    /// The same for a Jacobian with columns for parameters: the variance of each state.
+    #[expect(clippy::too_many_arguments, reason = "what the noise may depend on, and where the answer goes")]
+    pub(crate) fn added_variances<S: Number<f64>>(
+        &self,
+        x: &[S],
+        z: &[S],
+        u: Drive<'_>,
+        t: f64,
+        dt: f64,
+        variances: &mut [S],
+        work: &mut Work<S>,
+    ) {
+        let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt, span: (t, dt) };
+        self.process_variances(&leaves, dt, variances, work);
+    }
+
+    /// The exact step of a sample, where there is one and nothing is unknown: Phi, Psi and X, and Q, column after column.
+    pub(crate) fn exact_matrices(&self) -> Option<[Vec<f64>; 4]> {
+        let Step::Exact(_) = self.step else { return None };
+        let (n, mut work) = (self.states.len(), Work::new());
+        let (x, u) = (vec![0.0; n], vec![0.0; self.inputs.len()]);
+        let leaves = self.at(&x, &[], Drive::held(&u), 0.0);
+        self.keep_exact(&leaves, self.sample_time, &mut work);
+        let ExactStep { transition, integral, second_integral, noise_factor, noise_variances } =
+            work.exact?.step;
+        let entry = |place: usize| -> f64 {
+            let (row, column) = (place % n, place / n);
+            let of = |k: usize| noise_factor[k * n + row] * noise_variances[k] * noise_factor[k * n + column];
+            (0..n).map(of).sum()
+        };
+        let noise = (0..n * n).map(entry).collect();
+        Some([transition, integral, second_integral, noise])
+    }
+
     /// The equations of the next state, or of its derivative with the steps of the integration in a row; and those of
     /// the outputs.
-    pub(crate) fn compiled(&self) -> (&Program, Option<usize>, &Program) {
-        let steps = match self.step {
-            Step::Next => None,
-            Step::Integrated(count) => Some(count),
-        };
-        (&self.transition.by_state, steps, &self.observation.by_state)
+    pub(crate) fn compiled(&self) -> (&Program, Step, &Program) {
+        (&self.transition.by_state, self.step, &self.observation.by_state)
+    }
+
+    /// What the outputs are made of at a time.
+    pub(super) fn at<'a, S>(&self, x: &'a [S], z: &'a [S], u: Drive<'a>, t: f64) -> Leaves<'a, S> {
+        Leaves { states: x, parameters: z, inputs: u, time: t, step: 0.0, span: (t, self.sample_time) }
     }
 
     /// y and its Jacobian, of m rows.
@@ -143,40 +296,16 @@ impl GreyBox {
         &self,
         x: &[S],
         z: &[S],
-        u: &[f64],
+        u: Drive<'_>,
         t: f64,
         y: &mut [S],
         jacobian: &mut [S],
-        work: &mut Vec<S>,
+        work: &mut Work<S>,
     ) {
-        let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: 0.0 };
-        let program = reserve(work, self.observation.full.size());
+        let leaves = self.at(x, z, u, t);
+        let program = work.reserve(self.observation.full.size());
         self.observation.run(&leaves, y, jacobian, program);
     }
-
-    /// The state at the first row, and the standard deviations of what is known of it.
-    pub(crate) fn start(&self) -> (&[f64], &[f64]) {
-        (&self.start, &self.start_deviations)
-    }
-
-    /// What noise adds to the variance of each state over a step of `dt` seconds.
-    pub(crate) fn process_variances(&self, dt: f64) -> impl Iterator<Item = f64> {
-        let share = dt / self.sample_time;
-        self.process_variances.iter().map(move |variance| variance * share)
-    }
-
-    /// The variance of the noise of each output.
-    pub(crate) fn measurement_variances(&self) -> &[f64] {
-        &self.measurement_variances
-    }
-}
-
-/// At least this many numbers to work in.
-fn reserve<S: Number<f64>>(work: &mut Vec<S>, size: usize) -> &mut [S] {
-    if work.len() < size {
-        work.resize(size, 0.0.into());
-    }
-    work
 }
 
 /// target <- base + h k.

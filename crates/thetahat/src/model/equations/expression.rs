@@ -5,10 +5,11 @@
 //! product  = sign (("*" | "/") sign)*
 //! sign     = ("+" | "-") sign | power
 //! power    = operand ("^" sign)?                so that -x^2 = -(x^2) and x^y^z = x^(y^z)
-//! operand  = number | name | function "(" sum ("," sum)* within? ")" | table | branch | "(" sum ")"
+//! operand  = number | name | function "(" sum ("," sum)* within? ")" | table | branch | delayed | "(" sum ")"
 //! table    = ("table" | "lines") "(" sum ";" sum ":" sum ("," sum ":" sum)* ")"
 //! branch   = "if" sum ("<" | "<=" | ">" | ">=") sum within? "then" sum "else" sum
 //! within   = "within" sum
+//! delayed  = input "(" sum ")"                  where the sum is t less what parameters say
 //! ```
 //!
 //! Nothing is stored between text and graph: an operator combines two nodes as soon as both are read. What is nested is
@@ -22,7 +23,7 @@ use winnow::error::{ErrMode, ParserError};
 use winnow::stream::{LocatingSlice, Location, Stateful, Stream};
 
 use super::document::{quoted, suggestion};
-use super::graph::{Function, Graph, Node};
+use super::graph::{Function, Graph, Node, Operation};
 use super::interpolation::Shape;
 
 /// How deep an expression may be nested.
@@ -343,6 +344,16 @@ fn number(input: &mut Input<'_, '_>) -> Answer<Node> {
     Ok(input.state.graph.constant(value))
 }
 
+/// The place of the input that a name stands for.
+fn input_of(input: &Input<'_, '_>, name: &str) -> Option<usize> {
+    // Where there is no time, there are no delays.
+    input.state.names.node("t").ok()??;
+    match input.state.graph.operation(input.state.names.node(name).ok()??) {
+        Operation::Input(place) => Some(place),
+        _ => None,
+    }
+}
+
 /// A name, or a function with its arguments.
 fn name(input: &mut Input<'_, '_>) -> Answer<Node> {
     let name = word(rest(input));
@@ -360,6 +371,9 @@ fn name(input: &mut Input<'_, '_>) -> Answer<Node> {
     let function = FUNCTIONS.iter().find(|(function, _)| *function == name);
     if name == "log" {
         return refused("'log' is ambiguous: write 'ln' for the natural logarithm, or 'log10'".to_owned());
+    }
+    if let Some(place) = input_of(input, name).filter(|_| called && function.is_none()) {
+        return forms::delayed(input, name, place);
     }
     match (function, called) {
         (Some(("table", _)), true) => forms::table(input, name, Shape::Monotone, start),

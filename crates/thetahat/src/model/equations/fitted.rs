@@ -24,7 +24,8 @@ pub struct EquationsModel {
     pub parameters: Vec<Parameter>,
     /// The covariance matrix of the parameters, row by row.
     pub covariance: Option<Vec<Vec<f64>>>,
-    /// The covariance matrix of the noise of the measurements, row by row.
+    /// The covariance matrix of the noise of the measurements, row by row; on average over the estimation rows, where
+    /// it is not the same in all.
     pub noise_covariance: Vec<Vec<f64>>,
     /// The states, in the order of the text.
     pub states: Vec<String>,
@@ -36,17 +37,18 @@ pub struct EquationsModel {
 }
 
 impl EquationsModel {
-    /// A model and what was found for its unknown parameters: values, and their covariance.
-    pub(crate) fn new(model: &GreyBox, values: &[f64], covariance: Vec<Vec<f64>>) -> Self {
+    /// A model and what was found for its unknown parameters: values, and their covariance; and the variances of the
+    /// noise of its outputs, on average.
+    pub(crate) fn new(model: &GreyBox, values: &[f64], covariance: Vec<Vec<f64>>, variances: &[f64]) -> Self {
         let signals = |names: &[String]| -> Vec<Signal> {
             names.iter().map(|name| Signal { name: name.clone(), ..Signal::default() }).collect()
         };
         let parameters = model.unknown().zip(values).enumerate().map(|(index, (name, &value))| Parameter {
             name: name.to_owned(),
             value,
-            standard_error: Some(covariance[index][index].sqrt()),
+            // A noise that vanishes has none.
+            standard_error: Some(covariance[index][index].sqrt()).filter(|error| *error > 0.0),
         });
-        let variances = model.measurement_variances();
         let row = |i: usize| (0..variances.len()).map(|j| if i == j { variances[i] } else { 0.0 }).collect();
         Self {
             inputs: signals(model.inputs()),

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use thetahat_core::Number;
 
+use super::drive::Drive;
 use super::table::Table;
 
 /// A node, by its place in the [`Graph`].
@@ -63,6 +64,8 @@ pub(crate) enum Operation {
     Choose([Node; 4]),
     /// A table, by its place among those of the graph, or its derivative of this order.
     Table(usize, u8, Node),
+    /// An input a delay ago, by its place, or how fast it rises with the delay: the derivative of order 1.
+    Delayed(usize, u8, Node),
 }
 
 impl Operation {
@@ -75,9 +78,11 @@ impl Operation {
             | Self::Input(_)
             | Self::Time
             | Self::Step => [None; 4],
-            Self::Apply(_, x) | Self::Integer(x, _) | Self::Real(x, _) | Self::Table(_, _, x) => {
-                [Some(x), None, None, None]
-            }
+            Self::Apply(_, x)
+            | Self::Integer(x, _)
+            | Self::Real(x, _)
+            | Self::Table(_, _, x)
+            | Self::Delayed(_, _, x) => [Some(x), None, None, None],
             Self::Add(a, b)
             | Self::Subtract(a, b)
             | Self::Multiply(a, b)
@@ -85,6 +90,11 @@ impl Operation {
             | Self::Atan2(a, b) => [Some(a), Some(b), None, None],
             Self::Choose(nodes) => nodes.map(Some),
         }
+    }
+
+    /// Whether it is another number from row to row.
+    pub(super) fn moves(self) -> bool {
+        matches!(self, Self::State(_) | Self::Input(_) | Self::Delayed(..) | Self::Time)
     }
 
     /// The same with its arguments elsewhere.
@@ -100,6 +110,7 @@ impl Operation {
             Self::Atan2(a, b) => Self::Atan2(place(a), place(b)),
             Self::Choose(nodes) => Self::Choose(nodes.map(place)),
             Self::Table(table, order, x) => Self::Table(table, order, place(x)),
+            Self::Delayed(input, order, x) => Self::Delayed(input, order, place(x)),
             leaf => leaf,
         }
     }
@@ -110,9 +121,19 @@ impl Operation {
 pub(super) struct Leaves<'a, S> {
     pub(super) states: &'a [S],
     pub(super) parameters: &'a [S],
-    pub(super) inputs: &'a [f64],
+    pub(super) inputs: Drive<'a>,
     pub(super) time: f64,
     pub(super) step: f64,
+    /// When the step began that the time is in, and its seconds: delayed inputs are means over it.
+    pub(super) span: (f64, f64),
+}
+
+impl<'a, S> Leaves<'a, S> {
+    /// Of what knows parameters alone.
+    pub(super) fn of_parameters(parameters: &'a [S]) -> Self {
+        let inputs = Drive::held(&[]);
+        Self { states: &[], parameters, inputs, time: 0.0, step: 0.0, span: (0.0, 0.0) }
+    }
 }
 
 /// The value of one operation, given those before it.
@@ -128,7 +149,7 @@ pub(super) fn value<S: Number<f64>>(
         Operation::Constant(bits) => f64::from_bits(bits).into(),
         Operation::State(index) => leaves.states[index],
         Operation::Parameter(index) => leaves.parameters[index],
-        Operation::Input(index) => leaves.inputs[index].into(),
+        Operation::Input(index) => leaves.inputs.value(index, leaves.time).into(),
         Operation::Time => leaves.time.into(),
         Operation::Step => leaves.step.into(),
         Operation::Apply(function, x) => applied(function, at(x)),
@@ -146,6 +167,11 @@ pub(super) fn value<S: Number<f64>>(
             Some(_) => at(d),
         },
         Operation::Table(table, order, x) => tables[table].value(order, at(x)),
+        Operation::Delayed(input, order, delay) => {
+            let delay = at(delay);
+            let (value, slope) = leaves.inputs.delayed(input, leaves.time, leaves.span, delay.value());
+            if order == 0 { (delay - delay.value()) * slope + value } else { slope.into() }
+        }
     }
 }
 
@@ -183,7 +209,7 @@ pub(super) struct Graph {
 
 impl Graph {
     /// The node 0, which every graph has.
-    const ZERO: Node = 0;
+    pub(super) const ZERO: Node = 0;
 
     pub(super) fn new() -> Self {
         let mut graph = Self { operations: Vec::new(), known: HashMap::new(), tables: Vec::new() };
@@ -193,6 +219,10 @@ impl Graph {
 
     pub(super) fn operations(&self) -> &[Operation] {
         &self.operations
+    }
+
+    pub(super) fn operation(&self, node: Node) -> Operation {
+        self.operations[node]
     }
 
     pub(super) fn tables(&self) -> &[Arc<Table>] {
@@ -234,7 +264,7 @@ impl Graph {
             return self.add_node(operation);
         };
         let places = |node| arguments.iter().position(|argument| *argument == Some(node)).unwrap_or(0);
-        let none = Leaves { states: &[], parameters: &[], inputs: &[], time: 0.0, step: 0.0 };
+        let none = Leaves::of_parameters(&[]);
         let value = value::<f64>(operation.moved(places), &self.tables, &none, &[a, b, c, d]);
         self.constant(value)
     }
@@ -332,6 +362,39 @@ impl Graph {
             self.tables.len() - 1
         });
         self.combined(Operation::Table(place, 0, x))
+    }
+
+    /// An input a delay ago.
+    pub(super) fn delayed(&mut self, input: usize, delay: Node) -> Node {
+        match self.known(delay) {
+            Some(0.0) => self.leaf(Operation::Input(input)),
+            _ => self.add_node(Operation::Delayed(input, 0, delay)),
+        }
+    }
+
+    /// How long ago a time is that is written as t - delay; none if it is something else.
+    pub(super) fn delay_of(&mut self, time: Node) -> Option<Node> {
+        let of_time = |operation| operation == Operation::Time;
+        match self.operations[time] {
+            Operation::Time => Some(Self::ZERO),
+            Operation::Subtract(from, less) if !self.depends(&[less], of_time) => {
+                let delay = self.delay_of(from)?;
+                Some(self.add(delay, less))
+            }
+            Operation::Add(one, other) => {
+                let (from, more) = if self.depends(&[one], of_time) { (one, other) } else { (other, one) };
+                let delay = self.delay_of(from).filter(|_| !self.depends(&[more], of_time))?;
+                Some(self.subtract(delay, more))
+            }
+            _ => None,
+        }
+    }
+
+    /// All inputs, now and a delay ago.
+    pub(super) fn drives(&self) -> Vec<Operation> {
+        let is_drive =
+            |operation: &&Operation| matches!(operation, Operation::Input(_) | Operation::Delayed(_, 0, _));
+        self.operations.iter().filter(is_drive).copied().collect()
     }
 
     /// Whether these are made of any node of this kind.
@@ -439,6 +502,12 @@ impl Graph {
                 }
                 let outer = self.combined(Operation::Table(table, order + 1, x));
                 self.multiply(outer, slopes[x])
+            }
+            // Of an input that is held or goes in lines nothing more is known.
+            Operation::Delayed(_, 1.., _) => Self::ZERO,
+            Operation::Delayed(input, 0, delay) => {
+                let outer = self.add_node(Operation::Delayed(input, 1, delay));
+                self.multiply(outer, slopes[delay])
             }
         }
     }

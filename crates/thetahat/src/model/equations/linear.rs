@@ -18,7 +18,7 @@
 
 use thetahat_core::{Dual, Number};
 
-use super::{EquationsModel, GreyBox};
+use super::{Drive, EquationsModel, GreyBox, Work};
 use crate::Error;
 use crate::model::{Orders, PolynomialModel, fitted::propagated};
 
@@ -42,6 +42,15 @@ impl EquationsModel {
                 format!(
                     "{what} is of linear models, and these equations are not linear in their states and inputs, or know the time: \
                      they predict, simulate, validate, compare and filter"
+                ),
+            ));
+        }
+        if model.longest_delay().is_some() || !model.linear_holds().is_empty() {
+            return Err(Error::argument(
+                "model",
+                format!(
+                    "{what} is of inputs that are held from row to row and act without delay, and these equations say otherwise of an \
+                     input: they predict, simulate, validate, compare and filter"
                 ),
             ));
         }
@@ -101,12 +110,13 @@ impl EquationsModel {
 fn coefficients<S: Number<f64>>(model: &GreyBox, z: &[S]) -> Vec<Coefficients<S>> {
     let (n, m, inputs) = (model.states().len(), model.outputs().len(), model.inputs().len());
     let zero: S = 0.0.into();
-    let mut work = Vec::new();
+    let mut work = Work::new();
     let origin = vec![zero; n];
     // F and H, column after column, and what u does beside what stands without it.
     let mut at = |u: &[f64]| {
         let (mut next, mut f) = (vec![zero; n], vec![zero; n * n]);
         let (mut y, mut h) = (vec![zero; m], vec![zero; m * n]);
+        let u = Drive::held(u);
         model.advance(&origin, z, u, 0.0, model.sample_time(), &mut next, &mut f, &mut work);
         model.observe(&origin, z, u, 0.0, &mut y, &mut h, &mut work);
         (next, f, y, h)

@@ -34,6 +34,16 @@ impl Program {
         &self.tables
     }
 
+    /// How many nodes it computes.
+    pub(crate) fn results(&self) -> usize {
+        self.results.len()
+    }
+
+    /// What it computes where nothing is unknown and nothing varies.
+    pub(crate) fn constants(&self) -> Vec<f64> {
+        self.run::<f64>(&Leaves::of_parameters(&[]), &mut vec![0.0; self.size()]).collect()
+    }
+
     /// The operations that the first `count` nodes need, each with its place, and the places of these nodes.
     pub(crate) fn first(&self, count: usize) -> (Vec<(usize, Operation)>, &[usize]) {
         let results = self.results.get(..count).unwrap_or(&self.results);

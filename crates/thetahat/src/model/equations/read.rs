@@ -3,9 +3,11 @@
 use super::document::{Document, Entry, Section, error_at, quoted, suggestion};
 use super::dynamics::{Functions, Step};
 use super::expression::{self, CONSTANTS, Names};
-use super::graph::{Graph, Node, Operation};
+use super::graph::{Graph, Leaves, Node, Operation};
+use super::noise::{Nodes, Noise, Reader};
+use super::parameter::{Given, parameters};
 use super::program::Program;
-use super::{GreyBox, Scale, Unknown};
+use super::{GreyBox, Unknown};
 use crate::Error;
 
 /// Most substeps of a step.
@@ -30,9 +32,15 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     ])?;
     let sample_time = root.require("sample_time", "the seconds of a sample")?.positive()?;
     let needed = |key: &str, what: &str| root.require(key, what)?.section();
-    let (states, start, start_deviations) =
-        states(&needed("states", "a table of the states, such as [states] x = { start = 0, sd = 1 }")?)?;
-    let inputs = root.section("inputs")?.map_or(Ok(Vec::new()), |section| inputs(&section))?;
+    let states = needed("states", "a table of the states, such as [states] x = { start = 0, sd = 1 }")?;
+    let states = match states.entries() {
+        none if none.is_empty() => {
+            return Err(states.error("[states] is empty: a model has at least one state"));
+        }
+        some => some,
+    };
+    let (inputs, lines) =
+        root.section("inputs")?.map_or(Ok((Vec::new(), Vec::new())), |section| inputs(&section))?;
     let parameters = match root.section("parameters")? {
         Some(section) => parameters(&section, known)?,
         None => Vec::new(),
@@ -57,12 +65,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     for (entry, parameter) in parameters {
         let node = match parameter {
             Given::Known(value) => graph.constant(value),
-            Given::Unknown(parameter) => {
-                let variable = graph.leaf(Operation::Parameter(unknown.len()));
-                let node = parameter.scale.node(&mut graph, variable);
-                unknown.push(parameter);
-                node
-            }
+            Given::Unknown(parameter) => parameter.join(&mut unknown, &mut graph),
         };
         scope.declare(entry.key, node, &entry)?;
     }
@@ -91,47 +94,92 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     }
     few(&outputs.iter().collect::<Vec<_>>(), "outputs")?;
     let seen = outputs.iter().map(|entry| scope.read(entry, &mut graph)).collect::<Result<Vec<_>, _>>()?;
-    if let Some((entry, _)) = inputs.iter().find(|(_, channel)| outputs.iter().any(|out| out.key == channel))
+    if let Some((entry, channel)) =
+        inputs.iter().find(|(_, channel)| outputs.iter().any(|out| out.key == channel))
     {
         return Err(entry.value_error(format!(
             "the channel {} is an output too: it can only be one of them",
-            quoted(entry.text()?)
+            quoted(channel)
         )));
     }
     let noise = needed("noise", "a table of standard deviations, such as [noise] measurement = { y = 0.1 }")?;
-    let (process_variances, measurement_variances) = noises(&noise, &states, &outputs)?;
+    let mut reader = Reader { scope: &scope, graph: &mut graph, unknown: &mut unknown, known };
+    let started = states.iter().map(|state| reader.start(state)).collect::<Result<Vec<_>, _>>()?;
+    let [process, measurement] = reader.noises(&noise, &states, &outputs)?;
+    let estimated = states.len() + unknown.len();
+    if estimated > MOST {
+        let message = format!(
+            "there are {estimated} states and unknown parameters together, and equations have up to {MOST}"
+        );
+        return Err(noise.error(message));
+    }
+    let place = |place: usize| started.iter().map(move |nodes| nodes[place]);
+    let nodes = Nodes { start: place(0).chain(place(1)).collect(), process, measurement };
+    let acts = [&rates[..], &seen[..], &nodes.start[..]].concat();
+    for (index, unknown) in unknown.iter_mut().enumerate() {
+        unknown.of_noise = !graph.depends(&acts, |operation| operation == Operation::Parameter(index));
+    }
+    let noise = Noise::new(&graph, &nodes);
 
     let (transition, first) = functions(&mut graph, &rates, states.len(), unknown.len());
     let (observation, second) = functions(&mut graph, &seen, states.len(), unknown.len());
-    let mut slopes: Vec<Node> = first.into_iter().chain(second).collect();
-    let bends = |operation| matches!(operation, Operation::State(_) | Operation::Parameter(_));
     let all: Vec<Node> = rates.iter().chain(&seen).copied().collect();
     let is_state = |operation| matches!(operation, Operation::State(_));
-    let linear = unknown.is_empty() && !graph.depends(&slopes, bends) && !graph.jumps(&all, is_state);
-    let moves = |operation| matches!(operation, Operation::State(_) | Operation::Input(_) | Operation::Time);
-    for input in 0..inputs.len() {
-        slopes.extend(graph.derivatives(&all, Operation::Input(input)));
-    }
-    let superposes = !graph.depends(&slopes, moves) && !graph.jumps(&all, moves);
+    let noises = [&nodes.process[..], &nodes.measurement[..]].concat();
+    let by_states: Vec<Node> = first.iter().chain(&second).copied().collect();
+    let bends = |operation| matches!(operation, Operation::State(_) | Operation::Parameter(_));
+    let linear = unknown.is_empty()
+        && !graph.depends(&by_states, bends)
+        && !graph.jumps(&all, is_state)
+        && !graph.depends(&noises, is_state);
+    let drives = graph.drives();
+    let is_linear = |graph: &mut Graph, functions: &[Node], by_states: Vec<Node>| {
+        let mut slopes = by_states;
+        drives.iter().for_each(|&drive| slopes.extend(graph.derivatives(functions, drive)));
+        !graph.depends(&slopes, Operation::moves) && !graph.jumps(functions, Operation::moves)
+    };
+    let superposes = is_linear(&mut graph, &all, by_states);
     let any_step = step != Step::Next || graph.depends(&rates, |operation| operation == Operation::Step);
+    let step = match step {
+        Step::Integrated(count)
+            if !graph.depends(&[&rates[..], &nodes.process[..]].concat(), |leaf| leaf == Operation::Time)
+                && !graph.depends(&nodes.process, Operation::moves)
+                && is_linear(&mut graph, &rates, first) =>
+        {
+            Step::Exact(count)
+        }
+        other => other,
+    };
+    let goes_in_line = |operation| match operation {
+        Operation::Input(input) | Operation::Delayed(input, ..) => lines.get(input).copied().unwrap_or(false),
+        _ => false,
+    };
+    let has_lines = graph.depends(&rates, goes_in_line);
+    if let Some((entry, _)) = inputs.iter().zip(&lines).find(|(_, line)| **line).map(|(input, _)| input)
+        && step == Step::Next
+    {
+        return Err(entry.value_error(
+            "hold = \"linear\" goes with [derivative]: [next] knows an input at its rows alone",
+        ));
+    }
     Ok(GreyBox {
         text: text.to_owned(),
         sample_time,
-        start,
-        start_deviations,
         states: states.iter().map(|state| state.key.to_owned()).collect(),
-        inputs: inputs.into_iter().map(|(_, channel)| channel).collect(),
         outputs: outputs.iter().map(|entry| entry.key.to_owned()).collect(),
         linear,
         superposes,
+        any_step,
+        bends: has_lines,
+        delays: longest_delays(&graph, inputs.len(), &unknown),
+        inputs: inputs.into_iter().map(|(_, channel)| channel).collect(),
+        linear_holds: lines,
         unknown,
         known: known.to_vec(),
         step,
-        any_step,
         transition,
         observation,
-        process_variances,
-        measurement_variances,
+        noise,
     })
 }
 
@@ -143,6 +191,23 @@ fn few(entries: &[&Entry<'_>], what: &str) -> Result<(), Error> {
         }
         None => Ok(()),
     }
+}
+
+/// The longest delay of each input with parameters as they start; none of one that acts at once.
+fn longest_delays(graph: &Graph, inputs: usize, unknown: &[Unknown]) -> Vec<Option<f64>> {
+    let delays = graph.drives().into_iter().filter_map(|drive| match drive {
+        Operation::Delayed(input, _, delay) => Some((input, delay)),
+        _ => None,
+    });
+    let (places, nodes): (Vec<usize>, Vec<Node>) = delays.unzip();
+    let program = Program::new(graph, &nodes);
+    let z: Vec<f64> = unknown.iter().map(|unknown| unknown.start_variable().0).collect();
+    let mut longest = vec![None; inputs];
+    let mut numbers = vec![0.0; program.size()];
+    for (place, delay) in places.into_iter().zip(program.run(&Leaves::of_parameters(&z), &mut numbers)) {
+        longest[place] = Some(longest[place].map_or(delay, |longest: f64| longest.max(delay)));
+    }
+    longest
 }
 
 /// The programs of some nodes and their derivatives, and the derivatives by the states.
@@ -160,7 +225,7 @@ fn functions(graph: &mut Graph, roots: &[Node], states: usize, parameters: usize
 }
 
 /// What the names of the equations stand for.
-struct Scope<'d> {
+pub(super) struct Scope<'d> {
     names: Vec<(&'d str, Node)>,
     time: Node,
     /// None where `dt` may not stand.
@@ -180,7 +245,7 @@ impl<'d> Scope<'d> {
     }
 
     /// The expression of an entry: a text, or a mere number.
-    fn read(&self, entry: &Entry<'_>, graph: &mut Graph) -> Result<Node, Error> {
+    pub(super) fn read(&self, entry: &Entry<'_>, graph: &mut Graph) -> Result<Node, Error> {
         if !entry.is_text() {
             return Ok(graph.constant(entry.number()?));
         }
@@ -231,99 +296,32 @@ fn check_name(name: &str, entry: &Entry<'_>) -> Result<(), Error> {
     Ok(())
 }
 
-/// The states, where they start, and the standard deviations of that.
-type States<'d> = (Vec<Entry<'d>>, Vec<f64>, Vec<f64>);
+/// The channels of the inputs, and which of these go from row to row in straight lines: none if the list is empty.
+type Inputs<'d> = (Vec<(Entry<'d>, String)>, Vec<bool>);
 
-fn states<'d>(section: &Section<'d>) -> Result<States<'d>, Error> {
-    let entries = section.entries();
-    if entries.is_empty() {
-        return Err(section.error("[states] is empty: a model has at least one state"));
-    }
-    let (mut starts, mut deviations) = (Vec::new(), Vec::new());
-    for entry in &entries {
-        let state = entry.section()?;
-        state.allow(&["start", "sd"])?;
-        starts.push(state.number("start")?.unwrap_or(0.0));
-        let what =
-            "the standard deviation of what is known of the state at the first row; 0: it is known exactly";
-        deviations.push(state.require("sd", what)?.non_negative()?);
-    }
-    Ok((entries, starts, deviations))
-}
-
-fn inputs<'d>(section: &Section<'d>) -> Result<Vec<(Entry<'d>, String)>, Error> {
+fn inputs<'d>(section: &Section<'d>) -> Result<Inputs<'d>, Error> {
     let mut inputs: Vec<(Entry<'d>, String)> = Vec::new();
+    let mut lines = Vec::new();
     for entry in section.entries() {
-        let channel = entry.text()?.to_owned();
+        let channel = if entry.is_table() {
+            let table = entry.section()?;
+            table.allow(&["channel", "hold"])?;
+            let hold = table.get("hold").map(|hold| hold.one_of(&["zero", "linear"])).transpose()?;
+            lines.push(hold == Some("linear"));
+            table.require("channel", "the channel of the log")?.text()?.to_owned()
+        } else {
+            lines.push(false);
+            entry.text()?.to_owned()
+        };
         if inputs.iter().any(|(_, other)| *other == channel) {
             return Err(entry.value_error(format!("the channel {} is there twice", quoted(&channel))));
         }
         inputs.push((entry, channel));
     }
-    Ok(inputs)
-}
-
-/// What a model says of a parameter.
-enum Given {
-    Known(f64),
-    Unknown(Unknown),
-}
-
-fn parameters<'d>(section: &Section<'d>, known: &[(String, f64)]) -> Result<Vec<(Entry<'d>, Given)>, Error> {
-    let entries = section.entries().into_iter();
-    entries.map(|entry| parameter(&entry, known).map(|given| (entry, given))).collect()
-}
-
-fn parameter(entry: &Entry<'_>, known: &[(String, f64)]) -> Result<Given, Error> {
-    if !entry.is_table() {
-        return Ok(Given::Known(entry.number()?));
+    if !lines.contains(&true) {
+        lines.clear();
     }
-    let section = entry.section()?;
-    section.allow(&["start", "sd", "unknown", "min", "max", "walk"])?;
-    let start = section.require("start", "the value that the parameter starts from")?;
-    let value = start.number()?;
-    let (min, max) = (section.number("min")?, section.number("max")?);
-    if let (Some(low), Some(high), Some(entry)) = (min, max, section.get("max"))
-        && low >= high
-    {
-        return Err(entry.value_error(format!("'max' is {high}, but 'min' is {low}: it must be above it")));
-    }
-    let scale = Scale::new(min, max);
-    if !scale.contains(value) {
-        let bounds = match scale {
-            Scale::Free => "finite".to_owned(),
-            Scale::Above(min) => format!("above {min}"),
-            Scale::Below(max) => format!("below {max}"),
-            Scale::Between(min, max) => format!("between {min} and {max}"),
-        };
-        return Err(
-            start.value_error(format!("{} starts at {value}: it must be {bounds}", quoted(entry.key)))
-        );
-    }
-    let deviation = section.get("sd").map(|sd| sd.positive()).transpose()?;
-    let walk = section.get("walk").map(|walk| walk.non_negative()).transpose()?;
-    if !section.get("unknown").map_or(Ok(false), |flag| flag.flag())? {
-        let idle = ["sd", "min", "max", "walk"].into_iter().find_map(|key| section.get(key));
-        return match idle.filter(|_| section.get("unknown").is_none()) {
-            Some(idle) => Err(idle.error(format!(
-                "{} is of no use for a parameter that is known: add unknown = true, or write {} = {value}",
-                quoted(idle.key),
-                entry.key
-            ))),
-            None => Ok(Given::Known(value)),
-        };
-    }
-    if let Some((_, value)) = known.iter().find(|(name, _)| name == entry.key) {
-        return Ok(Given::Known(*value));
-    }
-    let deviation = deviation.ok_or_else(|| {
-        section.error(format!(
-            "the unknown parameter {} needs 'sd', how far off its start may be",
-            quoted(entry.key)
-        ))
-    })?;
-    let name = entry.key.to_owned();
-    Ok(Given::Unknown(Unknown { name, scale, start: value, deviation, walk: walk.unwrap_or(0.0) }))
+    Ok((inputs, lines))
 }
 
 /// How the states move on, and the table that says it.
@@ -352,38 +350,4 @@ fn equations<'d>(root: &Section<'d>) -> Result<(Step, Section<'d>), Error> {
             "there are no equations: give [next] with the next value of each state, or [derivative] with its derivative",
         )),
     }
-}
-
-/// The variances of states and outputs.
-fn noises(
-    section: &Section<'_>,
-    states: &[Entry<'_>],
-    outputs: &[Entry<'_>],
-) -> Result<(Vec<f64>, Vec<f64>), Error> {
-    section.allow(&["process", "measurement"])?;
-    let known = |table: &Section<'_>, entries: &[Entry<'_>], kind: &str| {
-        let stray = |entry: &Entry<'_>| !entries.iter().any(|known| known.key == entry.key);
-        match table.entries().into_iter().find(stray) {
-            None => Ok(()),
-            Some(entry) => {
-                let near = suggestion(entry.key, entries.iter().map(|known| known.key));
-                Err(entry.error(format!("{} is no {kind} of the model{near}", quoted(entry.key))))
-            }
-        }
-    };
-    let mut process = vec![0.0; states.len()];
-    if let Some(table) = section.section("process")? {
-        known(&table, states, "state")?;
-        for (variance, state) in process.iter_mut().zip(states) {
-            *variance = table.get(state.key).map_or(Ok(0.0), |entry| entry.non_negative())?.powi(2);
-        }
-    }
-    let table =
-        section.require("measurement", "the standard deviation of the noise of each output")?.section()?;
-    known(&table, outputs, "output")?;
-    let measurement = outputs.iter().map(|output| {
-        let what = "the standard deviation of the noise of this output";
-        Ok(table.require(output.key, what)?.positive()?.powi(2))
-    });
-    Ok((process, measurement.collect::<Result<_, Error>>()?))
 }

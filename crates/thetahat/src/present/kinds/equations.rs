@@ -56,13 +56,20 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &EquationsModel
 
 /// The parameters, and what was known of them before.
 fn parameters(outcome: &EquationsOutcome, model: &EquationsModel) -> Table {
-    let head = ["parameter", "value", "standard error", "start", "min", "max", "estimated as"];
-    let mut table = columns("Parameters", head).words(&[6]).on_pages(&[4, 5]);
-    for (parameter, known) in model.parameters.iter().zip(&outcome.unknown) {
+    let head =
+        ["parameter", "value", "standard error", "95 % from", "to", "start", "min", "max", "estimated as"];
+    let mut table = columns("Parameters", head)
+        .words(&[8])
+        .on_pages(&[6, 7])
+        .without(if outcome.profile.is_empty() { &[3, 4] } else { &[] });
+    for (index, (parameter, known)) in model.parameters.iter().zip(&outcome.unknown).enumerate() {
+        let profile = outcome.profile.get(index);
         table.row([
             word(&parameter.name),
             figure(parameter.value, number),
             error(parameter.standard_error),
+            figure(profile.and_then(|profile| profile.low), number),
+            figure(profile.and_then(|profile| profile.high), number),
             figure(known.start, short),
             figure(known.min, short),
             figure(known.max, short),

@@ -3,5 +3,6 @@ mod examples;
 mod experiments;
 mod gradient;
 mod models;
+mod noise;
 mod recovery;
 mod refusals;

@@ -14,8 +14,10 @@ use crate::validate::Test;
 
 /// Mean nis, relative to what is expected, outside of this range: the noises of the model are not those of the log.
 const FITTING: std::ops::RangeInclusive<f64> = 0.8..=1.25;
-/// Parameters whose correlation is beyond this one can hardly be told apart.
+/// Parameters whose correlation is beyond this one can hardly be told apart, if one of them has a standard error above
+/// this fraction of its value: else both are known well all the same.
 const ALIKE: f64 = 0.99;
+const BLURRED: f64 = 0.05;
 /// Innovations are called coloured below this p-value.
 const COLOURED: f64 = 0.01;
 
@@ -46,6 +48,16 @@ pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &
             outcome.search.iterations
         )),
     }
+    let vanishing = model.parameters.iter().zip(&outcome.unknown);
+    let vanishing =
+        vanishing.filter(|(own, known)| own.standard_error.is_none() && known.min == Some(own.value));
+    let vanishing: Vec<String> = vanishing.map(|(own, _)| own.name.clone()).collect();
+    if !vanishing.is_empty() {
+        warnings.push(format!(
+            "the log shows no sign of {}: the likelihood is largest without, at the lower bound, where there is no standard error",
+            listed(&vanishing)
+        ));
+    }
     let deviation = |index: usize| model.parameters[index].standard_error.unwrap_or(f64::NAN);
     for (index, (parameter, known)) in model.parameters.iter().zip(&outcome.unknown).enumerate() {
         for bound in [known.min, known.max].into_iter().flatten() {
@@ -61,7 +73,11 @@ pub(super) fn of_fit(model: &EquationsModel, estimation: &Estimation, walking: &
     for (i, row) in model.covariance.iter().flatten().enumerate() {
         for (j, covariance) in row.iter().enumerate().take(i) {
             let correlation = covariance / (deviation(i) * deviation(j));
-            if correlation.abs() > ALIKE {
+            let is_blurred = |index: &usize| {
+                let value = model.parameters[*index].value;
+                deviation(*index) > BLURRED * value.abs()
+            };
+            if correlation.abs() > ALIKE && [j, i].iter().any(is_blurred) {
                 let names = [j, i].map(|index| model.parameters[index].name.clone());
                 warnings.push(format!(
                     "the log can hardly tell {} apart (correlation {}): take one of them as known, or measure more",

@@ -122,6 +122,27 @@ pub struct Comparison {
     /// the same outputs, or the samples that count differ by more than one in twenty.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub criteria: Option<Vec<Criteria>>,
+    /// The likelihood ratios of models in equations of which one has all unknown parameters of the other, and more,
+    /// fitted to the same values.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub likelihood_ratios: Vec<LikelihoodRatio>,
+}
+
+/// Whether the further parameters of a model in equations say something: twice the difference of the logarithms of the
+/// likelihoods is chi² of as many degrees of freedom if they do not (Wilks 1938).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LikelihoodRatio {
+    /// The place of the model without them, from 0 on.
+    pub smaller: usize,
+    /// The place of the model with them.
+    pub larger: usize,
+    /// 2 (ln L of the larger - ln L of the smaller).
+    pub ratio: f64,
+    /// The further parameters.
+    pub parameters: Vec<String>,
+    /// The probability of as large a ratio if they say nothing. It is too large for a noise that the smaller model has at
+    /// 0, at most by the factor 2.
+    pub p_value: f64,
 }
 
 impl Document for Validation {

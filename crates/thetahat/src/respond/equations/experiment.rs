@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::Error;
 use crate::data::{Log, Rows, inside};
-use crate::model::GreyBox;
+use crate::model::{GreyBox, equations::Drive};
 
 /// Inputs and outputs of a log on its own clock, from its first row to the last one that counts.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub(crate) struct Experiment {
     inputs: Vec<f64>,
     /// Row after row; NaN where missing.
     outputs: Vec<f64>,
+    /// Which inputs go in straight lines from row to row; empty where none does.
+    linear: Vec<bool>,
     /// How many inputs and outputs there are.
     width: usize,
     height: usize,
@@ -103,6 +105,7 @@ impl Experiment {
             steps,
             inputs,
             outputs: across(&targets),
+            linear: model.linear_holds().to_vec(),
             width: sources.len(),
             height: targets.len(),
             held,
@@ -130,6 +133,11 @@ impl Experiment {
 
     pub(crate) fn input(&self, row: usize) -> &[f64] {
         &self.inputs[row * self.width..(row + 1) * self.width]
+    }
+
+    /// The inputs at a row and on to the next.
+    pub(crate) fn drive(&self, row: usize) -> Drive<'_> {
+        Drive::of_rows((&self.times, &self.inputs), self.width, &self.linear, row)
     }
 
     pub(crate) fn output(&self, row: usize) -> &[f64] {

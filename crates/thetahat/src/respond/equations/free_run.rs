@@ -18,7 +18,7 @@ use thetahat_core::nalgebra::{DMatrix, DVector};
 use super::experiment::Experiment;
 use super::predictor::Predictor;
 use super::walk::{reach, step};
-use crate::model::GreyBox;
+use crate::model::{GreyBox, equations::Work};
 
 const MOST_STEPS: usize = 30;
 /// The start is found when a step would lower the sum by less than this fraction.
@@ -54,13 +54,14 @@ pub(crate) fn free_run(
     begin: InitialState,
 ) -> Option<Vec<FreeRun>> {
     let mut filter = Predictor::new(model);
-    filter.restart(model);
+    filter.restart(model, z);
     let mut reached = 0;
     let mut runs = Vec::new();
     for rows in experiment.counted() {
         if begin == InitialState::Given {
             let mut simulation = Simulation::new(model, experiment, z, rows.clone(), Vec::new());
-            let start = model.start().0.to_vec();
+            let mut start = vec![0.0; model.states().len()];
+            model.start(z, &mut start, &mut [], &mut simulation.work);
             simulation.run(&start, None)?;
             runs.push(FreeRun { start, rows: rows.clone(), outputs: simulation.outputs });
             continue;
@@ -147,7 +148,9 @@ struct Simulation<'a> {
     state_matrix: DMatrix<f64>,
     output_matrix: DMatrix<f64>,
     outputs: Vec<f64>,
-    work: Vec<f64>,
+    /// The variances of the noise of the outputs in a row.
+    variances: Vec<f64>,
+    work: Work<f64>,
 }
 
 impl<'a> Simulation<'a> {
@@ -174,8 +177,9 @@ impl<'a> Simulation<'a> {
             state_matrix: DMatrix::zeros(n, n),
             output_matrix: DMatrix::zeros(m, n),
             outputs: vec![0.0; rows.len() * m],
+            variances: vec![0.0; m],
             rows,
-            work: Vec::new(),
+            work: Work::new(),
         }
     }
 
@@ -195,7 +199,7 @@ impl<'a> Simulation<'a> {
         for (place, row) in self.rows.clone().enumerate() {
             let steps = self.experiment.steps(row).filter(|_| place > 0);
             for (time, step) in steps {
-                let input = self.experiment.input(row - 1);
+                let input = self.experiment.drive(row - 1);
                 let (next, matrix) = (&mut self.next, self.state_matrix.as_mut_slice());
                 self.model.advance(&self.state, self.z, input, time, step, next, matrix, &mut self.work);
                 std::mem::swap(&mut self.state, &mut self.next);
@@ -204,16 +208,17 @@ impl<'a> Simulation<'a> {
                     std::mem::swap(&mut self.slopes, &mut self.moved);
                 }
             }
-            let (input, time) = (self.experiment.input(row), self.experiment.times[row]);
+            let (input, time) = (self.experiment.drive(row), self.experiment.times[row]);
             let outputs = &mut self.outputs[place * m..(place + 1) * m];
             let matrix = self.output_matrix.as_mut_slice();
             self.model.observe(&self.state, self.z, input, time, outputs, matrix, &mut self.work);
             if !self.state.iter().chain(&*outputs).all(|value| value.is_finite()) {
                 return None;
             }
-            let variances = self.model.measurement_variances().iter();
+            let variances = &mut self.variances;
+            self.model.measurement_variances(&self.state, self.z, input, time, variances, &mut self.work);
             for (output, (&measured, variance)) in
-                self.experiment.output(row).iter().zip(variances).enumerate()
+                self.experiment.output(row).iter().zip(&self.variances).enumerate()
             {
                 if measured.is_nan() {
                     continue;

@@ -81,7 +81,11 @@ impl<'l> EquationsOnLog<'l> {
         let spread = stored.covariance.as_ref().map(|rows| {
             let slopes: Vec<f64> =
                 model.parameters().iter().zip(&z).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
-            let entry = |i: usize, j: usize| rows[i][j] / (slopes[i] * slopes[j]);
+            let entry = |i: usize, j: usize| match slopes[i] * slopes[j] {
+                // A noise that vanishes: nothing that is predicted depends on it.
+                0.0 => 0.0,
+                slope => rows[i][j] / slope,
+            };
             (0..z.len()).map(|i| (0..z.len()).map(|j| entry(i, j)).collect()).collect()
         });
         Ok(Self {

@@ -11,7 +11,7 @@
 //! after the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same
 //! operations give de/dz and dS/dz, exact but for rounding.
 //!
-//! Time update: Thornton's modified weighted Gram-Schmidt on [F U | I] with the weights (D, Q). Measurement update:
+//! Time update: Thornton's modified weighted Gram-Schmidt on [F U | U_q] with the weights (D, D_q), Q = U_q D_q U_q'. Measurement update:
 //! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
 //! chapters V and VI).
 //!
@@ -22,7 +22,10 @@
 
 use thetahat_core::Number;
 
-use crate::model::GreyBox;
+use crate::model::{
+    GreyBox,
+    equations::{Drive, Work},
+};
 
 /// The estimate of the state and its covariance, and the workspace of a step. Matrices are column after column.
 #[derive(Debug, Clone)]
@@ -40,13 +43,17 @@ pub(crate) struct Predictor<S> {
     next: Vec<S>,
     /// F, n x n.
     state_matrix: Vec<S>,
-    /// The rows of [F U | I], one after the other, and the weights of their columns.
+    /// The process noise of the step, U_q and its variances, and the variance of the noise of each output.
+    process_factor: Vec<S>,
+    process: Vec<S>,
+    measurement: Vec<S>,
+    /// The rows of [F U | U_q], one after the other, and the weights of their columns.
     rows: Vec<S>,
     weights: Vec<S>,
     /// U'h and D U'h.
     projected: Vec<S>,
     gain: Vec<S>,
-    work: Vec<S>,
+    work: Work<S>,
 }
 
 /// e and S of one element.
@@ -54,6 +61,8 @@ pub(crate) struct Predictor<S> {
 pub(crate) struct Innovation<S> {
     pub(crate) error: S,
     pub(crate) variance: S,
+    /// The part of S that is noise of the measurement.
+    pub(crate) noise: S,
 }
 
 impl<S: Number<f64>> Predictor<S> {
@@ -68,23 +77,23 @@ impl<S: Number<f64>> Predictor<S> {
             output_matrix: zeros(m * n),
             next: zeros(n),
             state_matrix: zeros(n * n),
+            process_factor: zeros(n * n),
+            process: zeros(n),
+            measurement: zeros(m),
             rows: zeros(2 * n * n),
             weights: zeros(2 * n),
             projected: zeros(n),
             gain: zeros(n),
-            work: Vec::new(),
+            work: Work::new(),
         }
     }
 
     /// Goes to the start of a log: x0, and P diagonal.
-    pub(crate) fn restart(&mut self, model: &GreyBox) {
-        let (start, deviations) = model.start();
-        let n = start.len();
+    pub(crate) fn restart(&mut self, model: &GreyBox, z: &[S]) {
+        let n = self.state.len();
+        model.start(z, &mut self.state, &mut self.process, &mut self.work);
         self.factor.fill(S::from(0.0));
-        for (index, (&start, &deviation)) in start.iter().zip(deviations).enumerate() {
-            self.state[index] = S::from(start);
-            self.factor[index * n + index] = S::from(deviation * deviation);
-        }
+        self.factor.iter_mut().step_by(n + 1).zip(&self.process).for_each(|(own, &variance)| *own = variance);
     }
 
     /// Takes over the estimate of another.
@@ -94,9 +103,9 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// H P H' + r of one output about the predicted state: the variance of what is measured of it. n^2 multiply-adds.
-    pub(crate) fn variance(&self, output: usize, noise: f64) -> S {
+    pub(crate) fn variance(&self, output: usize) -> S {
         let (n, m) = (self.state.len(), self.output.len());
-        let mut variance = S::from(noise);
+        let mut variance = self.measurement[output];
         for column in 0..n {
             let known = (0..column)
                 .map(|k| self.factor[column * n + k] * self.output_matrix[k * m + output])
@@ -107,8 +116,10 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// Over a step of `dt` seconds from the time `t`, with the input held. About 4 n^3 multiply-adds beside the model.
-    pub(crate) fn predict(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64, dt: f64) {
+    pub(crate) fn predict(&mut self, model: &GreyBox, z: &[S], u: Drive<'_>, t: f64, dt: f64) {
         let n = self.state.len();
+        let (factor, variances) = (&mut self.process_factor, &mut self.process);
+        model.process_noise(&self.state, z, u, t, dt, factor, variances, &mut self.work);
         model.advance(&self.state, z, u, t, dt, &mut self.next, &mut self.state_matrix, &mut self.work);
         let zero = S::from(0.0);
         let width = 2 * n;
@@ -122,12 +133,14 @@ impl<S: Number<f64>> Predictor<S> {
             self.rows[row * width + n..(row + 1) * width].fill(zero);
             self.weights[row] = self.factor[row * n + row];
         }
-        // One column for each state that noise enters.
+        // One column for each direction that noise enters.
         let mut columns = n;
-        for (row, variance) in model.process_variances(dt).enumerate().take(n) {
-            if variance > 0.0 {
-                self.rows[row * width + columns] = S::from(1.0);
-                self.weights[columns] = S::from(variance);
+        for (index, &variance) in self.process.iter().enumerate() {
+            if variance.value() > 0.0 {
+                for row in 0..=index {
+                    self.rows[row * width + columns] = self.process_factor[index * n + row];
+                }
+                self.weights[columns] = variance;
                 columns += 1;
             }
         }
@@ -152,21 +165,23 @@ impl<S: Number<f64>> Predictor<S> {
     }
 
     /// Linearises the measurement about the predicted state.
-    pub(crate) fn observe(&mut self, model: &GreyBox, z: &[S], u: &[f64], t: f64) {
+    pub(crate) fn observe(&mut self, model: &GreyBox, z: &[S], u: Drive<'_>, t: f64) {
         model.observe(&self.state, z, u, t, &mut self.output, &mut self.output_matrix, &mut self.work);
+        model.measurement_variances(&self.state, z, u, t, &mut self.measurement, &mut self.work);
         self.origin.copy_from_slice(&self.state);
     }
 
-    /// Takes element `index` of the measurement, of variance `noise`. Gives its innovation; none where S is not
-    /// positive or a number not finite: then the filter is of no more use. 2 n^2 multiply-adds.
-    pub(crate) fn absorb(&mut self, index: usize, measured: f64, noise: f64) -> Option<Innovation<S>> {
+    /// Takes element `index` of the measurement. Gives its innovation; none where S is not positive or a number not
+    /// finite: then the filter is of no more use. 2 n^2 multiply-adds.
+    pub(crate) fn absorb(&mut self, index: usize, measured: f64) -> Option<Innovation<S>> {
         let (n, m) = (self.state.len(), self.output.len());
         let zero = S::from(0.0);
         let mut error = -(self.output[index] - measured);
         for column in 0..n {
             error -= self.output_matrix[column * m + index] * (self.state[column] - self.origin[column]);
         }
-        let mut variance = S::from(noise);
+        let noise = self.measurement[index];
+        let mut variance = noise;
         for column in 0..n {
             let known = (0..column)
                 .map(|k| self.factor[column * n + k] * self.output_matrix[k * m + index])
@@ -180,7 +195,7 @@ impl<S: Number<f64>> Predictor<S> {
         if !(s > 0.0 && s.is_finite() && (e * e / s).is_finite()) {
             return None;
         }
-        let mut before = S::from(noise);
+        let mut before = noise;
         for column in 0..n {
             let (f, v) = (self.projected[column], self.gain[column]);
             let after = before + f * v;
@@ -200,7 +215,7 @@ impl<S: Number<f64>> Predictor<S> {
         for (state, &gain) in self.state.iter_mut().zip(&self.gain) {
             *state += gain * scale;
         }
-        Some(Innovation { error, variance })
+        Some(Innovation { error, variance, noise })
     }
 
     /// Whether the state is made of numbers.

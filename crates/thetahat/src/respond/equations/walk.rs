@@ -5,7 +5,7 @@ use thetahat_core::Number;
 use super::experiment::Experiment;
 use super::predictor::{Innovation, Predictor};
 use crate::Error;
-use crate::model::GreyBox;
+use crate::model::{GreyBox, equations::Drive};
 
 /// Where the filter ceased to work: a number overflowed, or is none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,9 +45,9 @@ pub(crate) fn reach<S: Number<f64>>(
     row: usize,
 ) {
     for (time, step) in experiment.steps(row) {
-        predictor.predict(model, z, experiment.input(row - 1), time, step);
+        predictor.predict(model, z, experiment.drive(row - 1), time, step);
     }
-    predictor.observe(model, z, experiment.input(row), experiment.times[row]);
+    predictor.observe(model, z, experiment.drive(row), experiment.times[row]);
 }
 
 /// Takes the filter to a row and through what was measured in it. `told` hears of each element: which output, the
@@ -62,26 +62,24 @@ pub(crate) fn step<S: Number<f64>>(
     mut told: impl FnMut(usize, S, Innovation<S>),
 ) -> Option<()> {
     reach(model, experiment, predictor, z, row);
-    let found = absorb(model, experiment, predictor, row, &mut told);
+    let found = absorb(experiment, predictor, row, &mut told);
     if found.is_some() || !experiment.warms(row) {
         return found;
     }
-    predictor.restart(model);
-    predictor.observe(model, z, experiment.input(row), experiment.times[row]);
-    absorb(model, experiment, predictor, row, &mut told)
+    predictor.restart(model, z);
+    predictor.observe(model, z, experiment.drive(row), experiment.times[row]);
+    absorb(experiment, predictor, row, &mut told)
 }
 
 fn absorb<S: Number<f64>>(
-    model: &GreyBox,
     experiment: &Experiment,
     predictor: &mut Predictor<S>,
     row: usize,
     told: &mut impl FnMut(usize, S, Innovation<S>),
 ) -> Option<()> {
-    let variances = model.measurement_variances().iter();
-    for (output, (&measured, &noise)) in experiment.output(row).iter().zip(variances).enumerate() {
+    for (output, &measured) in experiment.output(row).iter().enumerate() {
         if !measured.is_nan() {
-            let innovation = predictor.absorb(output, measured, noise)?;
+            let innovation = predictor.absorb(output, measured)?;
             told(output, predictor.output[output], innovation);
         }
     }
@@ -98,7 +96,7 @@ pub(crate) fn walk(
     mut told: impl FnMut(Element, f64, Innovation<f64>),
 ) -> Result<(), Failure> {
     for (log, experiment) in experiments.iter().enumerate() {
-        predictor.restart(model);
+        predictor.restart(model, z);
         for row in 0..experiment.rows() {
             let counts = experiment.counts(row);
             step(model, experiment, predictor, z, row, |output, prediction, innovation| {
@@ -134,32 +132,32 @@ pub(crate) fn ahead<S: Number<f64>>(
     z: &[S],
     horizon: usize,
 ) -> Result<Vec<Predicted<S>>, usize> {
-    let (variances, rows) = (model.measurement_variances(), experiment.rows());
+    let (outputs, rows) = (model.outputs().len(), experiment.rows());
     let mut filter = Predictor::new(model);
-    filter.restart(model);
-    let mut predicted = Vec::with_capacity(rows * variances.len());
+    filter.restart(model, z);
+    let mut predicted = Vec::with_capacity(rows * outputs);
     let mut distant = filter.clone();
     // From the start, as long as no measurement is `horizon` rows back.
     for row in 0..rows.min(horizon) {
         reach(model, experiment, &mut distant, z, row);
-        say(&distant, variances, &mut predicted);
+        say(&distant, &mut predicted);
     }
     for base in 0..rows.saturating_sub(horizon) {
         step(model, experiment, &mut filter, z, base, |_, _, _| {}).ok_or(base)?;
         let target = base + horizon;
         if !experiment.counts(target) {
             let nothing = S::from(f64::NAN);
-            predicted.extend(variances.iter().map(|_| Predicted { value: nothing, variance: nothing }));
+            predicted.extend((0..outputs).map(|_| Predicted { value: nothing, variance: nothing }));
             continue;
         }
         distant.copy_from(&filter);
         for row in base + 1..target {
             for (time, step) in experiment.steps(row) {
-                distant.predict(model, z, experiment.input(row - 1), time, step);
+                distant.predict(model, z, experiment.drive(row - 1), time, step);
             }
         }
         reach(model, experiment, &mut distant, z, target);
-        say(&distant, variances, &mut predicted);
+        say(&distant, &mut predicted);
     }
     Ok(predicted)
 }
@@ -177,32 +175,29 @@ pub(crate) fn beyond<S: Number<f64>>(
     base: usize,
     steps: usize,
 ) -> Result<Vec<Predicted<S>>, usize> {
-    let variances = model.measurement_variances();
     let mut filter = Predictor::new(model);
-    filter.restart(model);
+    filter.restart(model, z);
     for row in 0..=base {
         step(model, experiment, &mut filter, z, row, |_, _, _| {}).ok_or(row)?;
     }
     let own = model.sample_time();
     let last = experiment.rows() - 1;
-    let mut predicted = Vec::with_capacity(steps * variances.len());
+    let mut predicted = Vec::with_capacity(steps * model.outputs().len());
     for row in base + 1..=base + steps {
         if row <= last {
             reach(model, experiment, &mut filter, z, row);
         } else {
             let before = experiment.times[last] + (row - 1 - last) as f64 * own;
-            filter.predict(model, z, &[], before, own);
-            filter.observe(model, z, &[], before + own);
+            filter.predict(model, z, Drive::held(&[]), before, own);
+            filter.observe(model, z, Drive::held(&[]), before + own);
         }
-        say(&filter, variances, &mut predicted);
+        say(&filter, &mut predicted);
     }
     Ok(predicted)
 }
 
 /// What a predictor expects of each output.
-fn say<S: Number<f64>>(predictor: &Predictor<S>, variances: &[f64], predicted: &mut Vec<Predicted<S>>) {
-    for (output, &noise) in variances.iter().enumerate() {
-        let variance = predictor.variance(output, noise);
-        predicted.push(Predicted { value: predictor.output[output], variance });
-    }
+fn say<S: Number<f64>>(predictor: &Predictor<S>, predicted: &mut Vec<Predicted<S>>) {
+    let each = predictor.output.iter().enumerate();
+    predicted.extend(each.map(|(output, &value)| Predicted { value, variance: predictor.variance(output) }));
 }

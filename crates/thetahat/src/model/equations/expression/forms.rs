@@ -48,11 +48,31 @@ fn within(input: &mut Input<'_, '_>) -> Answer<Option<(usize, Node)>> {
 
 /// Whether nothing that changes along a log is in a node.
 fn is_of_parameters(input: &Input<'_, '_>, node: Node) -> bool {
-    let moves = |operation| {
-        matches!(operation, Operation::State(_) | Operation::Input(_) | Operation::Time | Operation::Step)
-    };
     let graph = &*input.state.graph;
-    graph.known(node).is_some() || !graph.depends(&[node], moves)
+    graph.known(node).is_some()
+        || !graph.depends(&[node], |operation| operation.moves() || operation == Operation::Step)
+}
+
+/// An input a delay ago, from its '(' on.
+pub(super) fn delayed(input: &mut Input<'_, '_>, name: &str, place: usize) -> Answer<Node> {
+    let opened = input.input.current_token_start();
+    input.input.next_slice(1);
+    descend(input)?;
+    let time = sum(input).map_err(cut)?;
+    close(input, opened)?;
+    let form = format!("an input some seconds ago is written {name}(t - delay)");
+    let Some(delay) = input.state.graph.delay_of(time) else {
+        return Err(wrong(opened, format!("{form}; a product is written with '*'")));
+    };
+    if !is_of_parameters(input, delay) {
+        let message = "the delay is a number or made of parameters, not of states, inputs or the time";
+        return Err(wrong(opened, format!("{form}: {message}")));
+    }
+    if input.state.graph.known(delay).is_some_and(|delay| delay < 0.0) {
+        return Err(wrong(opened, format!("{form}: what {} will be is not known", quoted(name))));
+    }
+    let node = input.state.graph.delayed(place, delay);
+    ascend(input, node)
 }
 
 /// A branch after its `if`.

@@ -2,6 +2,7 @@ use thetahat_core::{Dual, Number};
 
 use super::expressions::Three;
 use super::{CART, PENDULUM};
+use crate::model::equations::{Drive, Work};
 use crate::model::{
     GreyBox,
     equations::{
@@ -21,13 +22,12 @@ pub(super) fn evaluated(text: &str, at: [f64; 3]) -> (f64, [f64; 3], [f64; 3]) {
         roots.extend(graph.derivatives(&[node], variable));
     }
     let program = Program::new(&graph, &roots);
-    let leaves = Leaves { states: &at[..2], parameters: &at[2..], inputs: &[], time: 0.0, step: 0.0 };
+    let leaves = Leaves { states: &at[..2], ..Leaves::of_parameters(&at[2..]) };
     let mut work = vec![0.0; program.size()];
     let found: Vec<f64> = program.run(&leaves, &mut work).collect();
 
     let variables = Dual::variables(at);
-    let leaves =
-        Leaves { states: &variables[..2], parameters: &variables[2..], inputs: &[], time: 0.0, step: 0.0 };
+    let leaves = Leaves { states: &variables[..2], ..Leaves::of_parameters(&variables[2..]) };
     let mut work = vec![Dual::from(0.0); program.size()];
     let dual = program.run(&leaves, &mut work).next().unwrap();
     (found[0], [found[1], found[2], found[3]], dual.derivatives)
@@ -84,9 +84,9 @@ fn step<S: Number<f64>>(model: &GreyBox, x: &[S], z: &[S], t: f64, dt: f64) -> [
     let zeros = |size| vec![S::from(0.0); size];
     let (mut next, mut by) = (zeros(n), zeros(n * (n + p)));
     let (mut y, mut seen_by) = (zeros(m), zeros(m * (n + p)));
-    let mut work = Vec::new();
-    model.advance(x, z, &[0.3], t, dt, &mut next, &mut by, &mut work);
-    model.observe(x, z, &[0.3], t, &mut y, &mut seen_by, &mut work);
+    let mut work = Work::new();
+    model.advance(x, z, Drive::held(&[0.3]), t, dt, &mut next, &mut by, &mut work);
+    model.observe(x, z, Drive::held(&[0.3]), t, &mut y, &mut seen_by, &mut work);
     [next, by, y, seen_by]
 }
 
@@ -119,7 +119,7 @@ fn jacobians_of_a_step_are_those_of_dual_numbers() {
         compare(&y, &seen_by, &dual_y);
         // With room for the states only, these columns are the same; and duals carry second derivatives.
         let (mut short, mut short_next) = (vec![0.0; n * n], vec![0.0; n]);
-        model.advance(&x, &z, &[0.3], 1.7, 0.2, &mut short_next, &mut short, &mut Vec::new());
+        model.advance(&x, &z, Drive::held(&[0.3]), 1.7, 0.2, &mut short_next, &mut short, &mut Work::new());
         assert_eq!((short.as_slice(), &short_next), (&by[..n * n], &next));
         let h = 1e-5;
         let slope = |place: usize| {
@@ -141,7 +141,7 @@ fn steps_of_a_differential_equation_are_of_order_four() {
     let end = |count: usize| {
         let model = GreyBox::from_toml(&text.replace("COUNT", &count.to_string())).unwrap();
         let (mut next, mut by) = ([0.0; 2], [0.0; 4]);
-        model.advance(&[1.0, 0.0], &[], &[], 0.5, 1.0, &mut next, &mut by, &mut Vec::new());
+        model.advance(&[1.0, 0.0], &[], Drive::held(&[]), 0.5, 1.0, &mut next, &mut by, &mut Work::new());
         (next, by)
     };
     let (exact, exact_by) = end(800);
@@ -165,8 +165,9 @@ fn a_step_allocates_nothing() {
     for text in [CART, PENDULUM] {
         let model = GreyBox::from_toml(text).unwrap();
         let z: Vec<f64> = model.parameters().iter().map(|parameter| parameter.start_variable().0).collect();
-        let (mut next, mut by, mut work) = ([0.0; 2], vec![0.0; 4 + 2 * z.len()], Vec::new());
-        let mut advance = || model.advance(&[0.1, 0.2], &z, &[1.0], 0.0, 0.1, &mut next, &mut by, &mut work);
+        let (mut next, mut by, mut work) = ([0.0; 2], vec![0.0; 4 + 2 * z.len()], Work::new());
+        let mut advance =
+            || model.advance(&[0.1, 0.2], &z, Drive::held(&[1.0]), 0.0, 0.1, &mut next, &mut by, &mut work);
         advance();
         assert_eq!(allocation_counter::measure(advance).count_total, 0);
     }

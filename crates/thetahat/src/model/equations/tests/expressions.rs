@@ -27,7 +27,7 @@ pub(super) fn value(text: &str) -> Result<f64, Fault> {
     let names = Three::new(&mut graph);
     let node = read(text, &mut graph, &names)?;
     let program = Program::new(&graph, &[node]);
-    let leaves = Leaves { states: &[2.0, 3.0], parameters: &[0.5], inputs: &[], time: 0.0, step: 0.0 };
+    let leaves = Leaves { states: &[2.0, 3.0], ..Leaves::of_parameters(&[0.5]) };
     let mut work = vec![f64::NAN; program.size()];
     Ok(program.run(&leaves, &mut work).next().unwrap())
 }

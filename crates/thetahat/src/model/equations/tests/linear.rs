@@ -1,5 +1,6 @@
 //! Transfer functions of linear equations.
 
+use crate::model::equations::{Drive, Work};
 use crate::model::{EquationsModel, GreyBox};
 
 /// Three states, two inputs of which one acts at once, two outputs, and two unknown parameters of which one has a
@@ -29,7 +30,8 @@ measurement = { y = 0.1, z = 0.2 }
 
 fn stored(values: [f64; 2]) -> EquationsModel {
     let model = GreyBox::from_toml(TEXT).unwrap();
-    EquationsModel::new(&model, &values, vec![vec![0.04, 0.01], vec![0.01, 0.09]])
+    let noise = model.measurement_variances_at_start();
+    EquationsModel::new(&model, &values, vec![vec![0.04, 0.01], vec![0.01, 0.09]], &noise)
 }
 
 #[test]
@@ -43,12 +45,12 @@ fn polynomials_answer_as_the_equations_do() {
         assert!((linear.noise_variance - [0.01, 0.04][output]).abs() < 1e-15);
         // Two runs that differ in their inputs alone: what stands there without inputs is not theirs.
         let run = |scale: f64| {
-            let (mut x, mut next) = (model.start().0.to_vec(), vec![0.0; 3]);
-            let (mut y, mut work) = (vec![0.0; 2], Vec::new());
+            let (mut x, mut next) = (model.started().0, vec![0.0; 3]);
+            let (mut y, mut work) = (vec![0.0; 2], Work::new());
             let each = (0..40).map(|t| {
                 let u = [scale * f64::from(t % 7), scale * f64::from(t * t % 5)];
-                model.observe(&x, &z, &u, 0.0, &mut y, &mut [0.0; 6], &mut work);
-                model.advance(&x, &z, &u, 0.0, 0.1, &mut next, &mut [0.0; 9], &mut work);
+                model.observe(&x, &z, Drive::held(&u), 0.0, &mut y, &mut [0.0; 6], &mut work);
+                model.advance(&x, &z, Drive::held(&u), 0.0, 0.1, &mut next, &mut [0.0; 9], &mut work);
                 x.copy_from_slice(&next);
                 y[output]
             });
@@ -105,7 +107,7 @@ fn equations_that_do_not_add_up_are_refused() {
     let linear = |from: &str, to: &str| {
         let model = GreyBox::from_toml(&TEXT.replace(from, to)).unwrap();
         assert!(TEXT.contains(from));
-        EquationsModel::new(&model, &[1.7, -0.4], vec![vec![0.04, 0.0], vec![0.0, 0.09]])
+        EquationsModel::new(&model, &[1.7, -0.4], vec![vec![0.04, 0.0], vec![0.0, 0.09]], &[1e-4, 1e-4])
             .linear("this test")
             .is_ok()
     };

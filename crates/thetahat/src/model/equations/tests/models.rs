@@ -1,4 +1,5 @@
 use super::{CART, PENDULUM};
+use crate::model::equations::{Drive, Work};
 use crate::model::{GreyBox, equations::Scale};
 
 #[test]
@@ -8,10 +9,14 @@ fn a_model_keeps_the_order_of_its_text() {
     assert_eq!(model.outputs(), ["end", "gyro"]);
     assert_eq!(model.inputs(), ["u"]);
     assert_eq!(model.unknown().collect::<Vec<_>>(), ["stiffness", "friction", "bias", "length"]);
-    assert_eq!(model.start(), ([0.4, -0.2].as_slice(), [0.1, 0.0].as_slice()));
-    assert_eq!(model.measurement_variances(), [0.01 * 0.01, 0.02 * 0.02]);
+    let (start, variances, _) = model.started();
+    assert_eq!((start, variances), (vec![0.4, -0.2], vec![0.1 * 0.1, 0.0]));
+    assert_eq!(model.measurement_variances_at_start(), [0.01 * 0.01, 0.02 * 0.02]);
     // The variance of a step of half a sample.
-    assert_eq!(model.process_variances(0.1).collect::<Vec<_>>(), [0.0, 0.1 * 0.1 * 0.5]);
+    let mut process = [0.0; 2];
+    let u = Drive::held(&[0.0]);
+    model.added_variances(&[0.4, -0.2], &[0.0; 4], u, 0.0, 0.1, &mut process, &mut Work::new());
+    assert_eq!(process, [0.0, 0.1 * 0.1 * 0.5]);
     let words: Vec<String> = model
         .parameters()
         .iter()
@@ -60,7 +65,7 @@ fn a_parameter_becomes_known() {
     let written = GreyBox::from_toml(&text).unwrap();
     let step = |model: &GreyBox, z: &[f64]| {
         let (mut next, mut by) = ([0.0; 2], [0.0; 4]);
-        model.advance(&[1.0, 2.0], z, &[1.0], 0.0, 0.1, &mut next, &mut by, &mut Vec::new());
+        model.advance(&[1.0, 2.0], z, Drive::held(&[1.0]), 0.0, 0.1, &mut next, &mut by, &mut Work::new());
         (next, by)
     };
     assert_eq!(step(&known, &[]), step(&written, &[]));

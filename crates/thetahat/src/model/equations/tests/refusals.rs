@@ -41,6 +41,62 @@ fn every_error_says_where_it_is_and_what_to_do() {
             "0",
             "line 4, column 12: 'states.position' must be a table, but here is a number",
         ),
+        (
+            "start = 0, sd = 1",
+            "start = 'velocity', sd = 1",
+            "line 4, column 22: a state begins before the first row is known: give a number, or an expression of \
+             parameters",
+        ),
+        // Inputs between rows, and before.
+        ("\"u\"", "{ channel = 'u', hold = 'first' }", "line 8, column 33: 'first' is none of: zero, linear"),
+        (
+            "\"u\"",
+            "{ hold = 'zero' }",
+            "line 8, column 1: 'inputs.force.channel' is missing: the channel of the log",
+        ),
+        (
+            "\"u\"",
+            "{ channel = 'u', hold = 'linear' }",
+            "line 8, column 9: hold = \"linear\" goes with [derivative]: [next] knows an input at its rows alone",
+        ),
+        (
+            "(force - ",
+            "(force(2) - ",
+            "line 16, column 35: an input some seconds ago is written force(t - delay); a product is written with '*'",
+        ),
+        (
+            "(force - ",
+            "(force(t - velocity) - ",
+            "line 16, column 35: an input some seconds ago is written force(t - delay): the delay is a number or made of \
+             parameters, not of states, inputs or the time",
+        ),
+        (
+            "(force - ",
+            "(force(t + 1) - ",
+            "line 16, column 35: an input some seconds ago is written force(t - delay): what 'force' will be is not known",
+        ),
+        // Noises.
+        ("velocity = 0.01", "velocity = 'speed'", "line 22, column 25: unknown name 'speed'"),
+        (
+            "y = 0.05",
+            "y = { start = 0, unknown = true }",
+            "line 23, column 31: 'measurement.y' starts at 0: it must be above 0",
+        ),
+        (
+            "y = 0.05",
+            "y = { start = 0.1, unknown = true, walk = 1 }",
+            "line 23, column 52: [noise.measurement.y] has no key 'walk'",
+        ),
+        (
+            "y = 0.05",
+            "y = { start = 0.1, unknown = true, min = -1 }",
+            "line 23, column 58: 'noise.measurement.y.min' is -1: it must be 0 or more",
+        ),
+        (
+            "y = 0.05",
+            "y = '0 * velocity'",
+            "line 23, column 21: this standard deviation is 0: it must be above 0",
+        ),
         // Parameters.
         (
             "start = 2, sd = 1",

@@ -4,6 +4,7 @@ use super::CART;
 use super::derivatives::evaluated;
 use super::expressions::{fault, value};
 use crate::model::GreyBox;
+use crate::model::equations::{Drive, Work};
 
 /// The value of an expression where x is this, y is 3 and a is 0.5, and its derivative by x.
 fn at(text: &str, x: f64) -> (f64, f64) {
@@ -237,8 +238,9 @@ fn a_table_is_looked_up_without_allocating() {
     let knots: Vec<String> = (0..500).map(|knot| format!("{knot}:{}", f64::from(knot).sqrt())).collect();
     let text = CART.replacen("damping * velocity", &format!("table(velocity; {})", knots.join(", ")), 1);
     let model = GreyBox::from_toml(&text).unwrap();
-    let (mut next, mut by, mut work) = ([0.0; 2], [0.0; 6], Vec::new());
-    let mut advance = || model.advance(&[0.1, 16.0], &[0.0], &[1.0], 0.0, 0.1, &mut next, &mut by, &mut work);
+    let (mut next, mut by, mut work) = ([0.0; 2], [0.0; 6], Work::new());
+    let mut advance =
+        || model.advance(&[0.1, 16.0], &[0.0], Drive::held(&[1.0]), 0.0, 0.1, &mut next, &mut by, &mut work);
     advance();
     assert_eq!(allocation_counter::measure(&mut advance).count_total, 0);
     // (1 - 4)/(0.1 + exp(0)) in a tenth of a second.

@@ -4,6 +4,7 @@ use super::models::{TRUTH, experiment, holed, log, pendulum, pendulum_text};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::filter::{Estimator, StateFilter, StateModel};
 use crate::model::GreyBox;
+use crate::model::equations::{Drive, Work};
 
 #[test]
 fn gradient_and_value_agree() {
@@ -61,21 +62,29 @@ fn value_is_the_likelihood_of_the_filter() {
 fn a_known_start_and_no_noise_inside_are_output_error() {
     let text = pendulum_text(0.0, 2, 3).replace("sd = 0.3", "sd = 0").replace("sd = 0.2", "sd = 0");
     let model = GreyBox::from_toml(&text).unwrap();
-    assert_eq!(model.start().1, [0.0; 2]);
+    assert_eq!(model.started().1, [0.0; 2]);
     let experiments = [experiment(&model, &holed(log(&model, &TRUTH[..3], 200, 9, 1.0)))];
     let z = [-0.4, 1.8, 1.4];
-    let (mut state, mut work) = (model.start().0.to_vec(), Vec::new());
+    let (mut state, mut work) = (model.started().0, Work::new());
     let mut sum = 0.0;
     for row in 0..experiments[0].rows() {
         if row > 0 {
             let (input, mut next) = (experiments[0].input(row - 1), [0.0; 2]);
-            model.advance(&state, &z, input, 0.0, 0.05, &mut next, &mut [0.0; 4], &mut work);
+            model.advance(&state, &z, Drive::held(input), 0.0, 0.05, &mut next, &mut [0.0; 4], &mut work);
             state = next.to_vec();
         }
         let mut outputs = [0.0; 2];
-        model.observe(&state, &z, experiments[0].input(row), 0.0, &mut outputs, &mut [0.0; 4], &mut work);
+        model.observe(
+            &state,
+            &z,
+            Drive::held(experiments[0].input(row)),
+            0.0,
+            &mut outputs,
+            &mut [0.0; 4],
+            &mut work,
+        );
         for (index, measured) in experiments[0].output(row).iter().enumerate().filter(|(_, y)| !y.is_nan()) {
-            let variance = model.measurement_variances()[index];
+            let variance = model.measurement_variances_at_start()[index];
             sum += (measured - outputs[index]).powi(2) / variance + (std::f64::consts::TAU * variance).ln();
         }
     }

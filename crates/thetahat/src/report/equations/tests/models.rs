@@ -7,6 +7,7 @@ use thetahat_numerics::noise::Noise;
 use crate::Error;
 use crate::data::{Channel, Log, Recording, Rows, Times};
 use crate::estimate::{EquationsOutcome, Procedure};
+use crate::model::equations::{Drive, Work};
 use crate::model::{EquationsModel, GreyBox, Model};
 use crate::report::{EquationsPlan, Report, fit_equations};
 use crate::respond::{
@@ -57,24 +58,30 @@ pub(super) fn log(model: &GreyBox, z: &[f64], rows: usize, seed: u64, noise: f64
     let (n, m) = (model.states().len(), model.outputs().len());
     let mut random = Noise(seed);
     let mut normal = |deviation: f64| deviation * noise * random.normal();
-    let (start, deviations) = model.start();
+    let (mut start, mut variances, mut work) = (vec![0.0; n], vec![0.0; n.max(m)], Work::new());
+    model.start(z, &mut start, &mut variances, &mut work);
     let mut x: Vec<f64> =
-        start.iter().zip(deviations).map(|(start, deviation)| start + normal(*deviation)).collect();
+        start.iter().zip(&variances).map(|(start, variance)| start + normal(variance.sqrt())).collect();
     let (mut u, mut y) = (Vec::new(), vec![Vec::new(); m]);
-    let (mut outputs, mut next, mut jacobian, mut work) =
-        (vec![0.0; m], vec![0.0; n], vec![0.0; n * n.max(m)], Vec::new());
+    let (mut outputs, mut next, mut jacobian) = (vec![0.0; m], vec![0.0; n], vec![0.0; n * n.max(m)]);
     let dt = model.sample_time();
     for row in 0..rows {
         let input = [if (row / 20) % 3 == 0 { 1.0 } else { -0.7 }];
         let time = row as f64 * dt;
-        model.observe(&x, z, &input, time, &mut outputs, &mut jacobian[..m * n], &mut work);
-        for ((channel, output), variance) in y.iter_mut().zip(&outputs).zip(model.measurement_variances()) {
+        model.observe(&x, z, Drive::held(&input), time, &mut outputs, &mut jacobian[..m * n], &mut work);
+        model.measurement_variances(&x, z, Drive::held(&input), time, &mut variances[..m], &mut work);
+        for ((channel, output), variance) in y.iter_mut().zip(&outputs).zip(&variances) {
             channel.push(output + normal(variance.sqrt()));
         }
         u.push(input[0]);
-        model.advance(&x, z, &input, time, dt, &mut next, &mut jacobian[..n * n], &mut work);
-        for ((x, next), variance) in x.iter_mut().zip(&next).zip(model.process_variances(dt)) {
-            *x = next + normal(variance.sqrt());
+        model.advance(&x, z, Drive::held(&input), time, dt, &mut next, &mut jacobian[..n * n], &mut work);
+        let drive = Drive::held(&input);
+        let mut factor = vec![0.0; n * n];
+        model.process_noise(&x, z, drive, time, dt, &mut factor, &mut variances[..n], &mut work);
+        x.copy_from_slice(&next);
+        for (column, variance) in factor.chunks_exact(n).zip(&variances) {
+            let drawn = normal(variance.sqrt());
+            x.iter_mut().zip(column).for_each(|(x, entry)| *x += entry * drawn);
         }
     }
     let channel = |(name, values): (&String, Vec<f64>)| Channel { name: name.clone(), values };

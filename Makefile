@@ -68,6 +68,7 @@ wheel:
 # The online estimators in single precision, 10^8 steps each; standard errors where inputs are held, 200 runs of 10^6 samples each.
 soak:
 	SOAK_STEPS=100000000 cargo test --locked --release -p thetahat-core --test soak -- --nocapture
+	SOAK_STEPS=1000000 cargo test --locked --release -p thetahat-core --lib zonotope -- --nocapture
 	HELD_RUNS=200 HELD_SAMPLES=1000000 cargo test --locked --release -p thetahat-core --test forgetting held -- --nocapture
 
 # 10^8 rows through a pipe to thetahat track: its memory, and how far it strays from the truth.

@@ -75,6 +75,10 @@ pub(crate) enum EstimatorArgument {
     Kalman,
     /// The extended Kalman filter; unknown parameters are estimated with the state
     Ekf,
+    /// The extended Kalman filter with iterated corrections, for accurate measurements of what bends
+    Iekf,
+    /// The unscented Kalman filter: as ekf, and its deviations know how the model bends
+    Ukf,
     /// The Luenberger observer, with --poles or --gain
     Luenberger,
 }

@@ -44,10 +44,14 @@ impl FilterJob {
             (_, Some(_)) => return Err(Failure::usage("--poles and --gain are for --estimator luenberger")),
             (Some(EstimatorArgument::Kalman), None) => Some(Estimator::Kalman),
             (Some(EstimatorArgument::Ekf), None) => Some(Estimator::Extended),
+            (Some(EstimatorArgument::Iekf), None) => Some(Estimator::Iterated),
+            (Some(EstimatorArgument::Ukf), None) => Some(Estimator::Unscented),
             (None, None) => None,
         };
         if arguments.smooth && matches!(estimator, Some(Estimator::Luenberger(_))) {
-            return Err(Failure::usage("--smooth: an observer knows no covariance; use kalman or ekf"));
+            return Err(Failure::usage(
+                "--smooth: an observer knows no covariance; use kalman, ekf, iekf or ukf",
+            ));
         }
         if arguments.clock.time.is_some() && sample_time.is_some() {
             return Err(Failure::usage(

@@ -200,16 +200,18 @@ impl StateFilter {
             (Some("luenberger"), None) => {
                 return Err(PyValueError::new_err("estimator: 'luenberger' needs poles or gain"));
             }
-            (Some("kalman") | Some("ekf") | None, Some(_)) => {
+            (Some("kalman" | "ekf" | "iekf" | "ukf") | None, Some(_)) => {
                 return Err(PyValueError::new_err("poles and gain are for estimator 'luenberger'"));
             }
             (Some("kalman"), None) => Estimator::Kalman,
             (Some("ekf"), None) => Estimator::Extended,
+            (Some("iekf"), None) => Estimator::Iterated,
+            (Some("ukf"), None) => Estimator::Unscented,
             (None, None) if model.is_linear() => Estimator::Kalman,
             (None, None) => Estimator::Extended,
             (Some(other), _) => {
                 return Err(PyValueError::new_err(format!(
-                    "estimator: '{other}' is none of 'kalman', 'ekf', 'luenberger'"
+                    "estimator: '{other}' is none of 'kalman', 'ekf', 'iekf', 'ukf', 'luenberger'"
                 )));
             }
         };

@@ -2,11 +2,12 @@
 
 use nalgebra::{OMatrix, OVector};
 
+use crate::around::around_kalman_filter;
 use crate::error::{check_entries, check_finite, check_length};
-use crate::kalman::prediction_error;
+use crate::kalman::{is_missing, prediction_error, whiten};
 use crate::state_space::transpose;
 use crate::triangle::column;
-use crate::ud::dot;
+use crate::ud::{self, add_multiple, dot};
 use crate::{Action, Covariance, Dimension, Error, Innovation, KalmanFilter, Observation, Real, Transition};
 
 /// The extended Kalman filter.
@@ -98,6 +99,8 @@ impl<T: Real, N: Dimension> From<KalmanFilter<T, N>> for ExtendedKalmanFilter<T,
     }
 }
 
+around_kalman_filter!(ExtendedKalmanFilter);
+
 impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
     /// A filter that starts from this estimate of the state and the covariance of its error.
     ///
@@ -111,42 +114,39 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         ExtendedKalmanFilter { linear, iterations: 1 }
     }
 
-    /// The same with a gate: see [`KalmanFilter::with_gate`].
-    ///
-    /// Errors: [`Error::OutOfRange`] if it is not above 0.
-    pub fn with_gate(mut self, gate: T) -> Result<Self, Error> {
-        self.set_gate(gate)?;
-        Ok(self)
-    }
-
-    /// The same with a measurement update that is iterated: it linearises the observation `count` times, each
-    /// time about its last result. 1 at first, which is no iteration.
+    /// The same with a measurement update that is iterated: the iterated extended Kalman filter. It linearises the
+    /// observation `count` times at most, each time about its last result. 1 at first, which is no iteration.
     ///
     /// ```text
-    /// x_0 = x̂;   H_i = ∂h/∂x at x_i:   x_(i+1) = x̂ + K_i (y - h(x_i, u) - H_i (x̂ - x_i))
+    /// V(x) = (x - x̂)'P⁻¹(x - x̂) + (y - h(x, u))'R⁻¹(y - h(x, u))
+    /// x_0 = x̂;   H_i = ∂h/∂x at x_i:   x = x̂ + K_i (y - h(x_i, u) - H_i (x̂ - x_i)),   x_(i+1) = x_i + t (x - x_i)
     /// ```
     ///
-    /// These are Gauss-Newton steps towards the most probable state. They help where the measurement is much
-    /// more accurate than the prediction and h bends between the two; two or three are enough if any are. The
-    /// innovation that is returned, and the gate, are those of the first.
+    /// These are Gauss-Newton steps towards the most probable state, the minimum of V. t is the first of 1, 1/2, 1/4 …
+    /// that makes V smaller: whole steps may go to and fro, or away, where h bends within the uncertainty of x̂. It ends
+    /// when no step does, or the step is rounding. P is that of the last linearisation.
+    ///
+    /// Iterations help where the measurement is much more accurate than the prediction and h bends between the two; two
+    /// or three are enough then. The innovation that is returned, and the gate, are those of the first.
     ///
     /// Errors: [`Error::OutOfRange`] if `count` is 0.
     ///
     /// Source: Jazwinski 1970, section 8.3; Bell and Cathey, The iterated Kalman filter update as a Gauss-Newton
-    /// method, 1993.
+    /// method, 1993; Skoglund, Hendeby and Axehill, Extended Kalman filter modifications based on an optimization view
+    /// point, 2015 (the length of the steps).
     pub fn with_iterations(mut self, count: usize) -> Result<Self, Error> {
         self.set_iterations(count)?;
         Ok(self)
     }
 
-    /// The estimate of the state, x̂.
-    pub fn state(&self) -> &OVector<T, N> {
-        self.linear.state()
-    }
-
-    /// The covariance of its error, P, as far as the linearised model knows it.
-    pub fn covariance(&self) -> &Covariance<T, N> {
-        self.linear.covariance()
+    /// Sets how often a measurement update linearises at most: see [`with_iterations`](ExtendedKalmanFilter::with_iterations),
+    /// whose errors it has.
+    pub fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
+        if count == 0 {
+            return Err(Error::OutOfRange { argument: "iterations", range: "1 or more" });
+        }
+        self.iterations = count;
+        Ok(())
     }
 
     /// The filter around which it is.
@@ -159,68 +159,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         &mut self.linear
     }
 
-    /// The same with a gate that lets go: see [`KalmanFilter::with_release`].
-    pub fn with_release(mut self, count: u16) -> Self {
-        self.set_release(count);
-        self
-    }
-
-    /// Puts the state where it is known to be: see [`KalmanFilter::set_state`], whose errors it has.
-    pub fn set_state(&mut self, state: OVector<T, N>) -> Result<(), Error> {
-        self.linear.set_state(state)
-    }
-
-    /// Sets P: see [`KalmanFilter::set_covariance`], whose errors it has.
-    pub fn set_covariance(&mut self, covariance: Covariance<T, N>) -> Result<(), Error> {
-        self.linear.set_covariance(covariance)
-    }
-
-    /// Takes P for larger by a factor: see [`KalmanFilter::widen`], whose errors it has.
-    pub fn widen(&mut self, factor: T) -> Result<(), Error> {
-        self.linear.widen(factor)
-    }
-
-    /// Takes P for larger by a sum: see [`KalmanFilter::widen_by`], whose errors it has.
-    pub fn widen_by(&mut self, covariance: &Covariance<T, N>) -> Result<(), Error> {
-        self.linear.widen_by(covariance)
-    }
-
-    /// Sets the gate: see [`KalmanFilter::with_gate`], whose errors it has.
-    pub fn set_gate(&mut self, gate: T) -> Result<(), Error> {
-        self.linear.set_gate(gate)
-    }
-
-    /// Sets when the gate lets go: see [`KalmanFilter::with_release`].
-    pub fn set_release(&mut self, count: u16) {
-        self.linear.set_release(count);
-    }
-
-    /// Sets how often a measurement update linearises: see [`with_iterations`](ExtendedKalmanFilter::with_iterations),
-    /// whose errors it has.
-    pub fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
-        if count == 0 {
-            return Err(Error::OutOfRange { argument: "iterations", range: "1 or more" });
-        }
-        self.iterations = count;
-        Ok(())
-    }
-
-    /// After how many measurements in a row the gate lets go; 0 if never.
-    pub fn release(&self) -> u16 {
-        self.linear.release()
-    }
-
-    /// How many of the latest measurements were above the gate: see [`KalmanFilter::gated_in_a_row`].
-    pub fn gated_in_a_row(&self) -> u16 {
-        self.linear.gated_in_a_row()
-    }
-
-    /// The gate on the normalised innovation squared: infinite if there is none.
-    pub fn gate(&self) -> T {
-        self.linear.gate()
-    }
-
-    /// How often a measurement update linearises the observation.
+    /// How often a measurement update linearises the observation at most.
     pub fn iterations(&self) -> usize {
         self.iterations
     }
@@ -303,26 +242,77 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
                 .absorb(first.rows, first.error, &first.noise, |h, v, s, e| record(0, h, v, s, e));
         }
         let mut corrected = self.linear.clone();
-        let innovation =
-            corrected.absorb(first.rows, first.error, &first.noise, |h, v, s, e| record(0, h, v, s, e))?;
+        let Linearised { rows, error, noise } = first.clone();
+        let innovation = corrected.absorb(rows, error, &noise, |h, v, s, e| record(0, h, v, s, e))?;
         if !matches!(innovation.action, Action::Updated | Action::Released) {
             self.linear = corrected;
             return Ok(innovation);
         }
         let (ungated, checked) = (self.linear.clone().with_gate(T::INFINITY)?, corrected.clone());
-        for iteration in 1..self.iterations {
-            let Linearised { rows, error, noise } =
-                Linearised::at(corrected.state(), observation, input, measurement)?
-                    .seen_from(self.linear.state(), corrected.state());
+        let (mut linearised, mut state) = (first, self.linear.state().clone());
+        for iteration in 1..=self.iterations {
+            // `corrected` is where the whole step from `state` leads.
+            let distance = |state: &OVector<T, N>, error: OVector<T, M>| {
+                let measured = squares(error, &linearised.noise, &innovation.variance);
+                self.linear.squared_distance(state) + measured
+            };
+            let before = distance(&state, linearised.error.clone());
+            // Rounding of h counts divided by the deviation of the noise.
+            let rounding = T::EPSILON.sqrt() * (T::one() + before);
+            let mut step = corrected.state().clone();
+            add_multiple(step.as_mut_slice(), -T::one(), state.as_slice());
+            let mut fraction = T::one();
+            let found = (0..HALVINGS).find_map(|_| {
+                let mut next = state.clone();
+                add_multiple(next.as_mut_slice(), fraction, step.as_slice());
+                fraction *= nalgebra::convert(0.5);
+                let error = prediction_error(measurement, observation.output(&next, input)).ok()?;
+                (distance(&next, error) < before + rounding).then_some(next)
+            });
+            let Some(next) = found else { break };
+            let change = next.as_slice().iter().zip(state.as_slice());
+            let ended = change.into_iter().all(|(&next, &x)| (next - x).abs() <= T::EPSILON * x.abs());
+            state = next;
+            if ended || iteration == self.iterations {
+                break;
+            }
+            linearised = Linearised::at(&state, observation, input, measurement)?;
+            let Linearised { rows, error, noise } = linearised.clone().seen_from(self.linear.state(), &state);
             corrected.clone_from(&ungated);
             corrected.absorb(rows, error, &noise, |h, v, s, e| record(iteration, h, v, s, e))?;
         }
+        corrected.set_state(state)?;
         self.linear = corrected.with_gate_of(&checked);
         Ok(innovation)
     }
 }
 
+/// How often a step of an iterated update is halved: to a thousandth.
+const HALVINGS: usize = 10;
+
+/// e'R⁻¹e of the elements that are there, R = V E V'. Where a measurement is exact, rounding beside its innovation
+/// variance stands for its noise.
+fn squares<T: Real, M: Dimension>(
+    mut error: OVector<T, M>,
+    noise: &Covariance<T, M>,
+    innovation: &OVector<T, M>,
+) -> T {
+    let m = error.len();
+    let missing: OVector<T, M> = error.clone();
+    let partial = whiten(&mut [], error.as_mut_slice(), noise);
+    let noise = partial.as_ref().unwrap_or(noise);
+    let each = error.iter().zip(missing.iter()).zip(innovation.iter()).enumerate();
+    each.fold(T::zero(), |sum, (index, ((&error, missing), &innovation))| {
+        if is_missing(missing) {
+            return sum;
+        }
+        let variance = ud::variance(noise.as_slice(), m, index).max(T::EPSILON * innovation);
+        sum + error * (error / variance)
+    })
+}
+
 /// An observation at one state.
+#[derive(Clone)]
 struct Linearised<T: Real, N: Dimension<M>, M: Dimension> {
     /// The rows of H, as columns.
     rows: OMatrix<T, N, M>,

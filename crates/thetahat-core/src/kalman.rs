@@ -280,6 +280,24 @@ impl<T: Real, N: Dimension> KalmanFilter<T, N> {
         self.covariance.transformed(&observation.output_matrix())?.plus(observation.noise())
     }
 
+    /// (x - x̂)'P⁻¹(x - x̂) = Σ z_j²/D_j with U z = x - x̂, over what P leaves open but for rounding.
+    pub(crate) fn squared_distance(&self, state: &OVector<T, N>) -> T {
+        let (factor, n) = (self.covariance.as_slice(), self.state.len());
+        let mut rest = state.clone();
+        add_multiple(rest.as_mut_slice(), -T::one(), self.state.as_slice());
+        let mut sum = T::zero();
+        for index in (0..n).rev() {
+            let (before, last) = rest.as_mut_slice().split_at_mut_checked(index).unwrap_or_default();
+            let Some(&mut z) = last.first_mut() else { continue };
+            add_multiple(before, -z, column(factor, n, index));
+            let variance = ud::variance(factor, n, index);
+            if variance >= T::MIN_POSITIVE && variance > T::EPSILON * ud::diagonal(factor, n, index) {
+                sum += z * (z / variance);
+            }
+        }
+        sum
+    }
+
     /// The time update: one sample ahead, with the input u(k).
     ///
     /// Errors, after which nothing has changed: [`Error::NotFinite`] if an input is NaN or infinite;
@@ -561,7 +579,7 @@ pub(crate) fn is_missing<T: Real>(sample: &T) -> bool {
 ///
 /// Returns V and E of those elements that are there, where that is another one than `noise`.
 #[inline(always)]
-fn whiten<T: Real, M: Dimension>(
+pub(crate) fn whiten<T: Real, M: Dimension>(
     rows: &mut [T],
     errors: &mut [T],
     noise: &Covariance<T, M>,

@@ -17,7 +17,9 @@
 //! | state of a model | |
 //! |---|---|
 //! | [`KalmanFilter`] | for [`LinearTransition`] and [`LinearObservation`]; any number of sensors |
-//! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`]; [`Augmented`] makes unknown parameters states |
+//! | [`ExtendedKalmanFilter`] | for any [`Transition`] and [`Observation`], iterated or not; [`Augmented`] makes unknown parameters states |
+//! | [`UnscentedKalmanFilter`] | the same without Jacobians, from values of the functions at points |
+//! | [`ZonotopeFilter`] | noise that is known by its bound alone: a set in which the state is for certain |
 //! | [`OutOfSequenceFilter`] | either of the two, where measurements come late; a [`FilterHistory`] of them |
 //! | [`LuenbergerObserver`] | a fixed gain, placed poles, or the gain of a [`SteadyState`] |
 //! | [`GainSchedule`] | gains and covariances ahead of the data |
@@ -113,6 +115,7 @@
 extern crate alloc;
 
 mod armax;
+mod around;
 mod arx;
 mod augmented;
 mod basis;
@@ -154,8 +157,10 @@ mod state_space;
 mod textbook;
 mod triangle;
 mod ud;
+mod unscented;
 mod vector_arx;
 mod windowed;
+mod zonotope;
 
 pub use nalgebra;
 
@@ -200,5 +205,7 @@ pub use smoother::{Smoothed, Smoother};
 pub use snapshot::SnapshotVersion;
 pub use solution::Solution;
 pub use state_space::{LinearObservation, LinearTransition, Observation, Transition};
+pub use unscented::UnscentedKalmanFilter;
 pub use vector_arx::RecursiveVectorArx;
 pub use windowed::{Window, WindowedLeastSquares};
+pub use zonotope::{SetInnovation, ZonotopeFilter};

@@ -5,11 +5,13 @@ use core::mem;
 
 use nalgebra::{OMatrix, OVector};
 
+use crate::around::Linearising;
 use crate::state_space::{add_product, transpose};
 use crate::triangle::{column, column_mut};
 use crate::ud::{add_multiple, dot};
 use crate::{
-    Action, Covariance, Dimension, Error, ExtendedKalmanFilter, Innovation, Observation, Real, Transition, ud,
+    Action, Covariance, Dimension, Error, ExtendedKalmanFilter, Innovation, Observation, Real, Transition,
+    UnscentedKalmanFilter, ud,
 };
 
 /// A filter that remembers its steps, and then tells each state given all measurements, later ones too.
@@ -28,12 +30,14 @@ use crate::{
 ///
 /// It is stepped as the filter is, with models that may vary in time, several sensors, missing elements, and a gate.
 /// Around an [`ExtendedKalmanFilter`] it smooths with the linearisations that the filter made, and is as good as
-/// these; with linear models the result is exact.
+/// these; with linear models the result is exact. Around an [`UnscentedKalmanFilter`] it is the unscented smoother: that
+/// filter's F is cov(x(k), x(k+1))'P⁻¹, so that P F' is the cross covariance by which Särkkä (2008) goes back.
 ///
 /// Units: those of the model. Memory: 2 n² + n numbers for each sample, and 2 n + 2 for each element measured.
 ///
 /// Source: Bryson and Frazier, Smoothing for linear and nonlinear dynamic systems, 1963; Bierman, Fixed interval
-/// smoothing with discrete measurements, 1973 (the modified form, with filtered estimates, and the factors).
+/// smoothing with discrete measurements, 1973 (the modified form, with filtered estimates, and the factors); Särkkä,
+/// Unscented Rauch-Tung-Striebel smoother, 2008.
 ///
 /// ```
 /// use thetahat_core::nalgebra::{Const, SVector, Vector1};
@@ -59,8 +63,8 @@ use crate::{
 /// # Ok::<(), Error>(())
 /// ```
 #[derive(Clone, Debug)]
-pub struct Smoother<T: Real, N: Dimension> {
-    filter: ExtendedKalmanFilter<T, N>,
+pub struct Smoother<T: Real, N: Dimension, F = ExtendedKalmanFilter<T, N>> {
+    filter: F,
     /// Those before the present one.
     samples: Vec<Sample<T, N>>,
     /// The elements measured at the present sample.
@@ -122,13 +126,24 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
     pub fn new(filter: impl Into<ExtendedKalmanFilter<T, N>>) -> Self {
         Smoother { filter: filter.into(), samples: Vec::new(), elements: Vec::new() }
     }
+}
 
+impl<T: Real, N: Dimension> From<UnscentedKalmanFilter<T, N>>
+    for Smoother<T, N, UnscentedKalmanFilter<T, N>>
+{
+    /// A smoother that starts where this filter stands.
+    fn from(filter: UnscentedKalmanFilter<T, N>) -> Self {
+        Smoother { filter, samples: Vec::new(), elements: Vec::new() }
+    }
+}
+
+impl<T: Real, N: Dimension, F: Linearising<T, N>> Smoother<T, N, F> {
     /// The filter: its estimate takes account of the measurements so far.
-    pub fn filter(&self) -> &ExtendedKalmanFilter<T, N> {
+    pub fn filter(&self) -> &F {
         &self.filter
     }
 
-    /// The time update: see [`ExtendedKalmanFilter::predict`]. A new sample begins.
+    /// The time update: see [`ExtendedKalmanFilter::predict`] or [`UnscentedKalmanFilter::predict`]. A new sample begins.
     ///
     /// Errors, after which nothing has changed: as there.
     pub fn predict<U: Dimension>(
@@ -136,14 +151,14 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
         transition: &impl Transition<T, N, U>,
         input: &OVector<T, U>,
     ) -> Result<(), Error> {
-        let (state, covariance) = (self.filter.state().clone(), self.filter.covariance().clone());
-        let state_matrix = self.filter.predict_recorded(transition, input)?;
+        let (state, covariance) = (self.filter.estimate().clone(), self.filter.uncertainty().clone());
+        let state_matrix = self.filter.predict_told(transition, input)?;
         let elements = mem::take(&mut self.elements);
         self.samples.push(Sample { elements, state, covariance, state_matrix });
         Ok(())
     }
 
-    /// The measurement update: see [`ExtendedKalmanFilter::correct`].
+    /// The measurement update: see [`ExtendedKalmanFilter::correct`] or [`UnscentedKalmanFilter::correct`].
     ///
     /// Errors, after which nothing has changed: as there.
     pub fn correct<M: Dimension + Dimension<N>, U: Dimension>(
@@ -155,7 +170,7 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
     where
         N: Dimension<M>,
     {
-        let size = self.filter.covariance().size();
+        let size = self.filter.uncertainty().size();
         let (mut elements, mut last_iteration) = (Vec::new(), 0);
         let record = |iteration, row: &[T], covariance: &[T], variance, error| {
             if iteration > last_iteration {
@@ -169,7 +184,7 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
             }
             elements.push(Element { row: h, gain, variance, error });
         };
-        let innovation = self.filter.correct_recorded(observation, input, measurement, record)?;
+        let innovation = self.filter.correct_told(observation, input, measurement, record)?;
         if matches!(innovation.action, Action::Updated | Action::Released) {
             self.elements.append(&mut elements);
         }
@@ -181,7 +196,7 @@ impl<T: Real, N: Dimension> Smoother<T, N> {
     ///
     /// Errors: [`Error::Overflow`]. About 5 n³ multiply-adds for each sample, and 2 n³ for each element measured.
     pub fn smooth(&self) -> Result<Vec<Smoothed<T, N>>, Error> {
-        let (state, covariance) = (self.filter.state(), self.filter.covariance());
+        let (state, covariance) = (self.filter.estimate(), self.filter.uncertainty());
         let mut future = Future::nothing(covariance.size());
         let mut smoothed = Vec::with_capacity(self.samples.len() + 1);
         smoothed.push(future.correct(state, covariance)?);

@@ -51,7 +51,12 @@ pub trait Transition<T: Real, N: Dimension, U: Dimension = Const<0>> {
     fn next(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OVector<T, N>;
 
     /// F = ∂f/∂x at x and u, n x n.
-    fn next_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, N, N>;
+    ///
+    /// A model for an [`UnscentedKalmanFilter`](crate::UnscentedKalmanFilter) alone need not have it: it is NaN then,
+    /// which every filter that wants it refuses with [`Error::NotFinite`].
+    fn next_jacobian(&self, state: &OVector<T, N>, _input: &OVector<T, U>) -> OMatrix<T, N, N> {
+        state.shape_generic().0.square(T::NAN)
+    }
 
     /// Q, the covariance of what the noise adds to the next state, n x n.
     fn process_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, N>;
@@ -121,7 +126,13 @@ pub trait Observation<
     fn output(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OVector<T, M>;
 
     /// H = ∂h/∂x at x and u, m x n.
-    fn output_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N>;
+    ///
+    /// A model for an [`UnscentedKalmanFilter`](crate::UnscentedKalmanFilter) alone need not have it: it is NaN then,
+    /// which every filter that wants it refuses with [`Error::NotFinite`].
+    fn output_jacobian(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> OMatrix<T, M, N> {
+        let outputs = self.output(state, input).shape_generic().0;
+        outputs.rows_by(state.shape_generic().0, T::NAN)
+    }
 
     /// R, the covariance of what the noise adds to the measurement, m x m.
     fn measurement_noise(&self, state: &OVector<T, N>, input: &OVector<T, U>) -> Covariance<T, M>;

@@ -18,7 +18,7 @@ use thetahat_core::{
     ExtendedKalmanFilter, Forgetting, GainSchedule, Innovation, InputOrders, KalmanFilter, Lags,
     LeastSquares, LinearObservation, LinearTransition, LuenbergerObserver, OutputErrorMethod, RecursiveArmax,
     RecursiveArx, RecursiveLeastSquares, RecursiveNarx, RecursiveOutputError, RecursiveVectorArx, RlsStart,
-    Scaling,
+    Scaling, UnscentedKalmanFilter, ZonotopeFilter,
 };
 
 const INPUTS: &[InputOrders] = &[InputOrders { nb: 1, nk: 2 }];
@@ -204,6 +204,11 @@ fn filters_and_observers() {
     let gated = filter.clone().with_gate(9.0).unwrap();
     for filter in [filter, gated] {
         let extended = ExtendedKalmanFilter::from(filter.clone()).with_iterations(2).unwrap();
+        let unscented = UnscentedKalmanFilter::from(filter.clone()).with_spread(2.0).unwrap();
+        check(unscented, |filter, k| {
+            filter.predict(&transition, &none).unwrap();
+            (filter.correct(&observation, &none, &Vector1::new(output(k))), *filter.state(), filter.spread())
+        });
         check(filter, |filter, k| {
             filter.predict(&transition, &none).unwrap();
             let innovation = filter.correct(&observation, &none, &Vector1::new(output(k)));
@@ -214,6 +219,13 @@ fn filters_and_observers() {
             (filter.correct(&observation, &none, &Vector1::new(output(k))), *filter.state())
         });
     }
+    let bounded: ZonotopeFilter<f64, Const<2>, Const<9>> =
+        ZonotopeFilter::new(Vector2::zeros(), &Vector2::new(9.0, 3.0), Const).unwrap();
+    check(bounded, |filter, k| {
+        filter.predict(&transition, &Vector2::new(0.0, 0.1), &none).unwrap();
+        let told = filter.correct(&observation, &Vector1::new(2.0), &none, &Vector1::new(output(k)));
+        (told.map(|told| (told.contradiction, told.action)), *filter.centre(), filter.reaches())
+    });
     let observer: LuenbergerObserver<f64, Const<2>, Const<1>> =
         LuenbergerObserver::new(Vector2::zeros(), Vector2::new(0.3, 0.1)).unwrap();
     check(observer, |observer, k| {
@@ -388,8 +400,13 @@ fn what_no_constructor_makes_is_refused() {
     refuses(&filter, &[("/state/2/0", numbers), ("/gate", nothing), covariance]);
     let dynamic = filter.to_size(Dyn(2)).unwrap();
     refuses(&dynamic, &[("/state", &[json!([3, 1, [0.0, 0.0, 0.0]])])]);
+    let unscented = UnscentedKalmanFilter::from(filter.clone());
+    refuses(&unscented, &[("/spread", &[json!(0.5), json!("NaN")]), ("/linear/state/2/0", numbers)]);
     let extended = ExtendedKalmanFilter::from(filter);
     refuses(&extended, &[("/iterations", &[json!(0)]), ("/linear/state/2/0", numbers)]);
+    let bounded: ZonotopeFilter<f64, Const<2>, Const<9>> =
+        ZonotopeFilter::new(Vector2::zeros(), &Vector2::new(9.0, 3.0), Const).unwrap();
+    refuses(&bounded, &[("/centre/2/0", numbers), ("/generators/2/0", numbers), ("/used", &[json!(10)])]);
     refuses(&GainSchedule::new(prior), &[("/covariance/factor/2/0", negative)]);
     let (transition, observation) = model();
     let transition = transition.to_size(Dyn(2)).unwrap();

@@ -17,8 +17,9 @@ use std::collections::VecDeque;
 use thetahat_core::nalgebra::{self, Const, Matrix3, RowVector3, SVector, Vector1, Vector3, Vector4};
 use thetahat_core::{
     Action, ArxOrders, Basis, Covariance, Forgetting, InputOrders, KalmanFilter, LeastSquares,
-    LinearObservation, LinearTransition, OutputErrorMethod, Polynomial, Real, RecursiveLeastSquares,
-    RecursiveNarx, RecursiveOutputError, Scaling, Window, WindowedLeastSquares,
+    LinearObservation, LinearTransition, Observation, OutputErrorMethod, Polynomial, Real,
+    RecursiveLeastSquares, RecursiveNarx, RecursiveOutputError, Scaling, Transition, UnscentedKalmanFilter,
+    Window, WindowedLeastSquares,
 };
 
 use noise::Noise;
@@ -430,4 +431,75 @@ fn kalman_filter() {
     }
     println!("Kalman filter: f32 and f64 differ by {largest:.1e} standard deviations at most");
     assert!(largest < 0.05, "{largest}");
+}
+
+/// A pendulum with friction, seen by the sideways position of its end, and the offset of that
+/// sensor: nothing drives the offset.
+struct Pendulum;
+
+impl<T: Real> Transition<T, Const<3>> for Pendulum {
+    fn next(&self, x: &SVector<T, 3>, _: &SVector<T, 0>) -> SVector<T, 3> {
+        let step: T = nalgebra::convert(0.05);
+        let pull = nalgebra::convert::<f64, T>(-9.81) * x[0].sine_and_cosine().0;
+        let friction = nalgebra::convert::<f64, T>(-1.5) * x[1];
+        Vector3::new(x[0] + step * x[1], x[1] + step * (pull + friction), x[2])
+    }
+    fn process_noise(&self, _: &SVector<T, 3>, _: &SVector<T, 0>) -> Covariance<T, Const<3>> {
+        Covariance::from_diagonal(&Vector3::new(1e-9, 1e-4, 1e-12).map(nalgebra::convert))
+            .expect("finite numbers")
+    }
+}
+
+impl<T: Real> Observation<T, Const<3>, Const<1>> for Pendulum {
+    fn output(&self, x: &SVector<T, 3>, _: &SVector<T, 0>) -> SVector<T, 1> {
+        Vector1::new(x[0].sine_and_cosine().0 + x[2])
+    }
+    fn measurement_noise(&self, _: &SVector<T, 3>, _: &SVector<T, 0>) -> Covariance<T, Const<1>> {
+        Covariance::from_diagonal(&Vector1::new(nalgebra::convert(1e-4))).expect("finite numbers")
+    }
+}
+
+/// The unscented filter through silences and gated outliers: no variance negative or lost.
+#[test]
+fn unscented_filter() {
+    let started = |x: f64| {
+        let prior = Covariance::from_diagonal(&Vector3::new(0.1, 1.0, 1.0)).expect("finite numbers");
+        UnscentedKalmanFilter::new(Vector3::new(x, 0.0, 0.0), prior)
+    };
+    let mut double = started(0.0).unwrap().with_gate(25.0).unwrap().with_release(20);
+    let prior = Covariance::from_diagonal(&Vector3::new(0.1_f32, 1.0, 1.0)).unwrap();
+    let mut single = UnscentedKalmanFilter::new(Vector3::zeros(), prior).unwrap();
+    single = single.with_gate(25.0).unwrap().with_release(20);
+    let (mut noise, mut truth) = (Noise(13), Vector3::new(0.3, 0.0, 0.1));
+    let (mut largest, mut errors) = (0.0_f64, 0.0_f64);
+    for step in 0..steps() {
+        truth = Transition::<f64, _>::next(&Pendulum, &truth, &SVector::zeros());
+        truth[1] += 0.01 * 3.0_f64.sqrt() * f64::from(noise.single());
+        single.predict(&Pendulum, &SVector::zeros()).unwrap();
+        double.predict(&Pendulum, &SVector::zeros()).unwrap();
+        if step % 10_000 < 9_900 {
+            let outlier = if step % 101 == 100 { 5.0 } else { 0.0 };
+            let output: Vector1<f64> =
+                Observation::<f64, _, Const<1>>::output(&Pendulum, &truth, &SVector::zeros());
+            let y = output[0] + outlier + 0.01 * 3.0_f64.sqrt() * f64::from(noise.single());
+            let innovation = single.correct(&Pendulum, &SVector::zeros(), &Vector1::new(y as f32)).unwrap();
+            assert!(innovation.nis.is_finite() && innovation.variance[0] > 0.0, "at {step}");
+            assert!(outlier == 0.0 || step < 1_000 || innovation.action == Action::Gated, "at {step}");
+            double.correct(&Pendulum, &SVector::zeros(), &Vector1::new(y)).unwrap();
+        }
+        let variances = single.covariance().variances();
+        assert!(variances.iter().all(|variance| *variance > 0.0), "at {step}: {variances:?}");
+        if step % 1_000 == 999 && step > 10_000 {
+            let deviations = double.covariance().variances().map(f64::sqrt);
+            let difference = (*single.state()).cast::<f64>() - double.state();
+            largest = largest.max(difference.component_div(&deviations).amax());
+            errors = errors.max((double.state() - truth).component_div(&deviations).amax());
+            let ratios = variances.cast::<f64>().map(f64::sqrt).component_div(&deviations);
+            assert!((ratios - Vector3::repeat(1.0)).amax() < 0.2, "at {step}: {ratios}");
+        }
+    }
+    println!(
+        "unscented filter: f32 and f64 differ by {largest:.1e} standard deviations at most, errors are {errors:.1}"
+    );
+    assert!(largest < 1.0 && errors < 7.0, "{largest} {errors}");
 }

@@ -162,6 +162,42 @@ fn iterations_go_to_the_most_probable_state() {
     assert!((filter.covariance().matrix() - expected).amax() < 1e-10);
 }
 
+/// The arc tangent of a number, measured.
+struct Saturating(f64);
+
+impl Observation<f64, Const<1>, Const<1>> for Saturating {
+    fn output(&self, x: &Vector1<f64>, _: &None) -> Vector1<f64> {
+        x.map(f64::atan)
+    }
+    fn output_jacobian(&self, x: &Vector1<f64>, _: &None) -> Vector1<f64> {
+        Vector1::new(1.0 / (1.0 + x[0] * x[0]))
+    }
+    fn measurement_noise(&self, _: &Vector1<f64>, _: &None) -> Covariance<f64, Const<1>> {
+        Covariance::from_diagonal(&Vector1::new(self.0)).unwrap()
+    }
+}
+
+/// Newton's method on the arc tangent goes away from 0 if it starts beyond 1.39: so do whole Gauss-Newton steps.
+#[test]
+fn steps_are_shortened_where_whole_ones_go_away() {
+    for (start, truth, variance) in [(4.0, 0.0, 1e-6), (-20.0, 0.5, 1e-6), (3.0, -0.2, 0.0), (2.0, 1.9, 1e-8)]
+    {
+        let prior = Covariance::from_diagonal(&Vector1::new(1e4)).unwrap();
+        let y = Vector1::new(f64::atan(truth));
+        let (mut x, mut whole) = (start, 0.0_f64);
+        for _ in 0..6 {
+            x += (y[0] - f64::atan(x)) * (1.0 + x * x);
+            whole = whole.max((x - truth).abs());
+        }
+        let filter = ExtendedKalmanFilter::new(Vector1::new(start), prior).unwrap();
+        let mut filter = filter.with_iterations(50).unwrap();
+        filter.correct(&Saturating(variance), &None::zeros(), &y).unwrap();
+        let found = filter.state()[0];
+        assert!((found - truth).abs() < 1e-4, "{start} {truth} {variance}: {found}");
+        assert!(truth == 1.9 || whole > 1e3, "{start} {truth}: {whole}");
+    }
+}
+
 #[test]
 fn what_is_gated_or_missing_is_not_iterated() {
     let prior = Covariance::from_diagonal(&Vector2::new(1.0, 1.0)).unwrap();

@@ -1,6 +1,6 @@
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 
-use super::kind::{Filter, Kind, Motion, Observer};
+use super::kind::{Filter, Kind, Motion, Observer, Unscented};
 use super::model::StateModel;
 use crate::Error;
 use crate::figures::number;
@@ -14,6 +14,13 @@ pub enum Estimator {
     /// The extended Kalman filter: for any model. Unknown parameters are estimated with the state. With a linear model
     /// it is the Kalman filter.
     Extended,
+    /// The extended Kalman filter with iterated measurement updates, at most ten linearisations each: for accurate
+    /// measurements that bend within the uncertainty of the state. See
+    /// [`with_iterations`](thetahat_core::ExtendedKalmanFilter::with_iterations).
+    Iterated,
+    /// The unscented Kalman filter: for any model. Its deviations know how the model bends within them. Unknown
+    /// parameters are estimated with the state. See [`UnscentedKalmanFilter`](thetahat_core::UnscentedKalmanFilter).
+    Unscented,
     /// The Luenberger observer, for a model without unknown parameters: see
     /// [`LuenbergerObserver`](thetahat_core::LuenbergerObserver).
     Luenberger(ObserverGain),
@@ -39,15 +46,21 @@ impl Estimator {
         match self {
             Self::Kalman => "kalman",
             Self::Extended => "ekf",
+            Self::Iterated => "iekf",
+            Self::Unscented => "ukf",
             Self::Luenberger(_) => "luenberger",
         }
     }
 }
 
+/// How often an iterated measurement update linearises at most.
+const ITERATIONS: usize = 10;
+
 /// What does the work of an [`Estimator`].
 #[derive(Debug, Clone)]
 pub(super) enum Engine {
     Filter(Filter),
+    Unscented(Unscented),
     Observer { observer: Observer, poles: Option<DVector<Complex<f64>>> },
 }
 
@@ -61,10 +74,19 @@ impl Engine {
                     [] => "the model is not linear in its state".to_owned(),
                     names => format!("the model has unknown parameters ({})", names.join(", ")),
                 };
-                let message = format!("{reason}: use the extended Kalman filter (ekf)");
+                let message =
+                    format!("{reason}: use the extended Kalman filter (ekf) or the unscented one (ukf)");
                 Err(Error::argument("estimator", message))
             }
             Estimator::Kalman | Estimator::Extended => Ok(Self::Filter(filter)),
+            Estimator::Iterated => {
+                let iterated = filter.with_iterations(ITERATIONS);
+                Ok(Self::Filter(iterated.map_err(|error| Error::argument("estimator", error.to_string()))?))
+            }
+            Estimator::Unscented => {
+                let unscented = Unscented::new(filter.state().clone(), filter.covariance().clone());
+                Ok(Self::Unscented(unscented.map_err(|error| Error::argument("start", error.to_string()))?))
+            }
             Estimator::Luenberger(_) if !unknown.is_empty() => Err(Error::argument(
                 "estimator",
                 format!(

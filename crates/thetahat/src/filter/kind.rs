@@ -1,20 +1,23 @@
 //! The kinds of models, and the steps of filters and observers over them.
 
+use std::borrow::Cow;
+
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector, Dyn};
 use thetahat_core::{
     Covariance, Error, ExtendedKalmanFilter, Innovation, LuenbergerObserver, Observation, Smoother,
-    Transition,
+    Transition, UnscentedKalmanFilter,
 };
 
 use super::frame::Frame;
 use super::lags::Lags;
 use super::linear::Linear;
-use super::linearization::{Linearization, Work};
+use super::linearization::{Function, Linearization, Work};
 use super::past::Past;
 use crate::data::Offset;
 use crate::model::{GreyBox, equations::whole_steps};
 
 pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
+pub(super) type Unscented = UnscentedKalmanFilter<f64, Dyn>;
 pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
 
 /// A row as a model sees it: deviations from the channels' offsets.
@@ -30,14 +33,30 @@ pub(super) struct Sample {
 /// How the time from one row to the next is taken: how many steps, and the seconds of each.
 pub(super) type Division = (usize, f64);
 
+/// The outputs that a filter expects, and how certain they are.
+pub(super) enum Expected<'a> {
+    /// By H, which has a column for each state and each unknown parameter, and R.
+    Linear(DVector<f64>, Cow<'a, DMatrix<f64>>, Cow<'a, DMatrix<f64>>),
+    /// With the variances of the innovations.
+    Known(DVector<f64>, DVector<f64>),
+}
+
 /// A filter, or a smoother around one.
 pub(super) trait Recursion {
-    fn filter(&self) -> &Filter;
+    fn state(&self) -> &DVector<f64>;
     fn predict(
         &mut self,
         transition: &impl Transition<f64, Dyn, Dyn>,
         input: &DVector<f64>,
     ) -> Result<(), Error>;
+    /// Expected outputs with the variances of their innovations; none where these follow from H.
+    fn expected(
+        &self,
+        _observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
+        _input: &DVector<f64>,
+    ) -> Result<Option<Expected<'static>>, Error> {
+        Ok(None)
+    }
     fn correct(
         &mut self,
         observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
@@ -46,49 +65,68 @@ pub(super) trait Recursion {
     ) -> Result<Innovation<f64, DVector<f64>>, Error>;
 }
 
-impl Recursion for Filter {
-    fn filter(&self) -> &Filter {
-        self
-    }
+/// A filter that tells what a row of a [`StateFilter`](super::StateFilter) needs.
+pub(super) trait Gaussian: Recursion {
+    fn covariance(&self) -> &Covariance<f64, Dyn>;
+}
 
-    fn predict(
-        &mut self,
-        transition: &impl Transition<f64, Dyn, Dyn>,
-        input: &DVector<f64>,
-    ) -> Result<(), Error> {
-        ExtendedKalmanFilter::predict(self, transition, input)
-    }
+/// The recursion of a filter of the core, or of the smoother around it.
+macro_rules! recursion {
+    ($type:ty, $filter:ident, $state:expr, $($expected:tt)*) => {
+        impl Recursion for $type {
+            fn state(&self) -> &DVector<f64> {
+                let $filter = self;
+                $state
+            }
 
-    fn correct(
-        &mut self,
+            fn predict(
+                &mut self,
+                transition: &impl Transition<f64, Dyn, Dyn>,
+                input: &DVector<f64>,
+            ) -> Result<(), Error> {
+                <$type>::predict(self, transition, input)
+            }
+
+            $($expected)*
+
+            fn correct(
+                &mut self,
+                observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
+                input: &DVector<f64>,
+                measurement: &DVector<f64>,
+            ) -> Result<Innovation<f64, DVector<f64>>, Error> {
+                <$type>::correct(self, observation, input, measurement)
+            }
+        }
+    };
+}
+
+recursion!(Filter, filter, filter.state(),);
+recursion!(Smoother<f64, Dyn>, smoother, smoother.filter().state(),);
+recursion!(Smoother<f64, Dyn, Unscented>, smoother, smoother.filter().state(),);
+recursion!(
+    Unscented,
+    filter,
+    filter.state(),
+    fn expected(
+        &self,
         observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
         input: &DVector<f64>,
-        measurement: &DVector<f64>,
-    ) -> Result<Innovation<f64, DVector<f64>>, Error> {
-        ExtendedKalmanFilter::correct(self, observation, input, measurement)
+    ) -> Result<Option<Expected<'static>>, Error> {
+        let (outputs, covariance) = Unscented::expected(self, observation, input)?;
+        Ok(Some(Expected::Known(outputs, covariance.variances())))
+    }
+);
+
+impl Gaussian for Filter {
+    fn covariance(&self) -> &Covariance<f64, Dyn> {
+        Filter::covariance(self)
     }
 }
 
-impl Recursion for Smoother<f64, Dyn> {
-    fn filter(&self) -> &Filter {
-        Smoother::filter(self)
-    }
-
-    fn predict(
-        &mut self,
-        transition: &impl Transition<f64, Dyn, Dyn>,
-        input: &DVector<f64>,
-    ) -> Result<(), Error> {
-        Smoother::predict(self, transition, input)
-    }
-
-    fn correct(
-        &mut self,
-        observation: &impl Observation<f64, Dyn, Dyn, Dyn>,
-        input: &DVector<f64>,
-        measurement: &DVector<f64>,
-    ) -> Result<Innovation<f64, DVector<f64>>, Error> {
-        Smoother::correct(self, observation, input, measurement)
+impl Gaussian for Unscented {
+    fn covariance(&self) -> &Covariance<f64, Dyn> {
+        Unscented::covariance(self)
     }
 }
 
@@ -166,17 +204,19 @@ impl Kind {
                 Motion::Lags(lags) => {
                     for index in 1..=count {
                         let next = if index == count { &to.inputs } else { &from.inputs };
-                        let transition = lags.ahead(filter.filter().state(), &from.inputs, next);
+                        let transition = Function::at(filter.state(), |x: &[f64]| {
+                            Ok(lags.ahead(&DVector::from_column_slice(x), &from.inputs, next))
+                        })?;
                         filter.predict(&transition, &from.inputs)?;
                     }
                 }
             },
             Kind::Grey(grey) => {
                 for index in 0..count {
-                    let (time, estimate) =
-                        (from.time + index as f64 * dt, filter.filter().state().as_slice());
-                    let transition =
-                        Linearization::ahead(grey, estimate, past.drive(from, 1), time, dt, work)?;
+                    let (time, inputs) = (from.time + index as f64 * dt, past.drive(from, 1));
+                    let transition = Function::at(filter.state(), |x: &[f64]| {
+                        Linearization::ahead(grey, x, inputs, time, dt, work)
+                    })?;
                     filter.predict(&transition, &from.inputs)?;
                 }
             }
@@ -184,25 +224,35 @@ impl Kind {
         Ok(())
     }
 
-    /// What the measurement of a row says. Before it is used, `show` is told the predicted outputs; H, which has a
-    /// column for each state and each unknown parameter; and R.
+    /// What the measurement of a row says. Before it is used, `show` is told the outputs that are expected.
     pub(super) fn correct(
         &self,
         filter: &mut impl Recursion,
         at: &Sample,
         (past, work): (&Past, &mut Work),
-        show: impl FnOnce(&DVector<f64>, &DMatrix<f64>, &DMatrix<f64>),
+        show: impl FnOnce(&Expected<'_>),
     ) -> Result<Innovation<f64, DVector<f64>>, Error> {
-        let estimate = filter.filter().state();
         match self {
             Kind::Sampled(frame, _) => {
-                let outputs = frame.observation.output(estimate, &at.inputs);
-                show(&outputs, &frame.output_matrix, &frame.output_noise);
-                filter.correct(&frame.observation, &at.inputs, &at.outputs)
+                let seen = &frame.observation;
+                let linear = || {
+                    let outputs = seen.output(filter.state(), &at.inputs);
+                    let noise = Cow::Borrowed(&frame.output_noise);
+                    Expected::Linear(outputs, Cow::Borrowed(&frame.output_matrix), noise)
+                };
+                show(&filter.expected(seen, &at.inputs)?.unwrap_or_else(linear));
+                filter.correct(seen, &at.inputs, &at.outputs)
             }
             Kind::Grey(grey) => {
-                let seen = Linearization::seen(grey, estimate.as_slice(), past.drive(at, 0), at.time, work)?;
-                show(&seen.values, &seen.jacobian, &seen.noise.matrix());
+                let inputs = past.drive(at, 0);
+                let seen = Function::at(filter.state(), |x: &[f64]| {
+                    Linearization::seen(grey, x, inputs, at.time, work)
+                })?;
+                let linear = || {
+                    let Linearization { values, jacobian, noise } = seen.linear(filter.state());
+                    Expected::Linear(values, Cow::Owned(jacobian), Cow::Owned(noise.matrix()))
+                };
+                show(&filter.expected(&seen, &at.inputs)?.unwrap_or_else(linear));
                 filter.correct(&seen, &at.inputs, &at.outputs)
             }
         }

@@ -1,4 +1,6 @@
-//! A model that is not linear, evaluated at one estimate: what a filter asks of it there.
+//! A model that is not linear, evaluated at an estimate: what a filter asks of it there.
+
+use std::cell::RefCell;
 
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, Error, Observation, Transition};
@@ -97,6 +99,67 @@ impl Linearization {
     }
 }
 
+/// A model wherever a filter asks, such as at the points of an unscented one: function, slopes and noise of one place
+/// are computed together, and kept for the next question.
+pub(super) struct Function<E> {
+    evaluate: RefCell<E>,
+    latest: RefCell<(DVector<f64>, Linearization)>,
+}
+
+impl<E: FnMut(&[f64]) -> Result<Linearization, Error>> Function<E> {
+    /// A function that is evaluated here first.
+    pub(super) fn at(estimate: &DVector<f64>, mut evaluate: E) -> Result<Self, Error> {
+        let first = evaluate(estimate.as_slice())?;
+        Ok(Self { evaluate: RefCell::new(evaluate), latest: RefCell::new((estimate.clone(), first)) })
+    }
+
+    /// What `take` takes of it at this place; where the model has no answer there, all its numbers are NaN, which a
+    /// filter refuses.
+    fn taken<A>(&self, place: &DVector<f64>, take: impl FnOnce(&Linearization) -> A) -> A {
+        let latest = &mut *self.latest.borrow_mut();
+        if latest.0 != *place {
+            match (self.evaluate.borrow_mut())(place.as_slice()) {
+                Ok(found) => latest.1 = found,
+                Err(_) => latest.1.values.fill(f64::NAN),
+            }
+            latest.0.copy_from(place);
+        }
+        take(&latest.1)
+    }
+
+    /// All of it here.
+    pub(super) fn linear(&self, place: &DVector<f64>) -> Linearization {
+        self.taken(place, Linearization::clone)
+    }
+}
+
+impl<E: FnMut(&[f64]) -> Result<Linearization, Error>> Transition<f64, Dyn, Dyn> for Function<E> {
+    fn next(&self, x: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
+        self.taken(x, |found| found.values.clone())
+    }
+
+    fn next_jacobian(&self, x: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        self.taken(x, |found| found.jacobian.clone())
+    }
+
+    fn process_noise(&self, x: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        self.taken(x, |found| found.noise.clone())
+    }
+}
+
+impl<E: FnMut(&[f64]) -> Result<Linearization, Error>> Observation<f64, Dyn, Dyn, Dyn> for Function<E> {
+    fn output(&self, x: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
+        self.taken(x, |found| found.values.clone())
+    }
+
+    fn output_jacobian(&self, x: &DVector<f64>, _: &DVector<f64>) -> DMatrix<f64> {
+        self.taken(x, |found| found.jacobian.clone())
+    }
+
+    fn measurement_noise(&self, x: &DVector<f64>, _: &DVector<f64>) -> Covariance<f64, Dyn> {
+        self.taken(x, |found| found.noise.clone())
+    }
+}
 impl Transition<f64, Dyn, Dyn> for Linearization {
     fn next(&self, _: &DVector<f64>, _: &DVector<f64>) -> DVector<f64> {
         self.values.clone()

@@ -6,7 +6,7 @@ use thetahat_core::{Action, Error, Innovation};
 use thetahat_numerics::distribution::chi_square_interval;
 
 use super::estimate::{StateEstimate, StateValues};
-use super::kind::{Filter, Kind, Sample};
+use super::kind::{Expected, Gaussian, Kind, Sample};
 use super::model::StateModel;
 
 /// The numbers of one row.
@@ -107,7 +107,7 @@ impl Row {
             && self.bounds == other.bounds
     }
 
-    pub(super) fn predicted(&mut self, filter: &Filter) -> Result<(), Error> {
+    pub(super) fn predicted(&mut self, filter: &impl Gaussian) -> Result<(), Error> {
         self.predicted.copy_from_slice(filter.state().as_slice());
         filter.covariance().write_into(&mut self.covariance)?;
         let diagonal = self.covariance.iter().step_by(self.predicted.len() + 1);
@@ -117,7 +117,7 @@ impl Row {
         Ok(())
     }
 
-    pub(super) fn filtered(&mut self, filter: &Filter) {
+    pub(super) fn filtered(&mut self, filter: &impl Gaussian) {
         self.filtered.copy_from_slice(filter.state().as_slice());
         for (deviation, variance) in self.filtered_deviations.iter_mut().zip(&filter.covariance().variances())
         {
@@ -145,8 +145,24 @@ impl Row {
         }
     }
 
+    /// The outputs that a filter expects, and the deviations of its innovations.
+    pub(super) fn expected(&mut self, expected: &Expected<'_>, sample: &Sample) {
+        match expected {
+            Expected::Linear(outputs, h, noise) => {
+                self.seen(outputs, sample);
+                self.output_deviations(h, noise);
+            }
+            Expected::Known(outputs, variances) => {
+                self.seen(outputs, sample);
+                for (deviation, variance) in self.output_deviations.iter_mut().zip(variances) {
+                    *deviation = variance.sqrt();
+                }
+            }
+        }
+    }
+
     /// The roots of S_ii = h_i'P h_i + R_ii, with the covariance of the prediction.
-    pub(super) fn output_deviations(&mut self, h: &DMatrix<f64>, noise: &DMatrix<f64>) {
+    fn output_deviations(&mut self, h: &DMatrix<f64>, noise: &DMatrix<f64>) {
         let (size, outputs) = (self.predicted.len(), self.output_deviations.len());
         let h = h.as_slice();
         for (output, deviation) in self.output_deviations.iter_mut().enumerate() {

@@ -1,8 +1,10 @@
-use thetahat_core::Smoother;
+use thetahat_core::nalgebra::Dyn;
+use thetahat_core::{Smoothed, Smoother};
 
 use super::StateFilter;
 use super::estimate::StateValues;
-use super::kind::Kind;
+use super::estimator::Engine;
+use super::kind::{Division, Kind, Recursion, Sample, Unscented};
 use super::linearization::Work;
 use super::past::Past;
 use crate::Error;
@@ -74,27 +76,24 @@ impl StateFilter {
         let kind = &self.model().kind;
         let overflow =
             |error: thetahat_core::Error| Error::data(format!("the states cannot be smoothed: {error}"));
-        let mut smoother = Smoother::new(kind.started().map_err(overflow)?);
-        let (mut past, mut work) = (Past::new(kind), Work::new());
-        // Which of the smoother's samples a row is.
-        let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
-        let mut previous = None;
-        for (division, sample) in history {
-            past.push(sample);
-            if let Some((previous, division)) = previous.zip(*division) {
-                let known = (&past, &mut work);
-                kind.predict(&mut smoother, previous, sample, division, known).map_err(overflow)?;
-                place += division.0;
+        let started = kind.started().map_err(overflow)?;
+        let smoothed = match &self.engine {
+            Engine::Unscented(_) => {
+                let unscented = Unscented::new(started.state().clone(), started.covariance().clone());
+                smoothed(kind, Smoother::from(unscented.map_err(overflow)?), history, Smoother::smooth)
             }
-            kind.correct(&mut smoother, sample, (&past, &mut work), |_, _, _| ()).map_err(overflow)?;
-            places.push(place);
-            previous = Some(sample);
-        }
-        let smoothed = smoother.smooth().map_err(overflow)?;
+            Engine::Filter(filter) => {
+                let iterated = started.with_iterations(filter.iterations()).map_err(overflow)?;
+                smoothed(kind, Smoother::new(iterated), history, Smoother::smooth)
+            }
+            // Refused above.
+            Engine::Observer { .. } => Ok(Vec::new()),
+        };
+        let smoothed = smoothed.map_err(overflow)?;
 
         let (states, parameters) = (self.model().states().len(), self.model().unknown().len());
         let (mut values, mut deviations) = (Vec::new(), Vec::new());
-        for sample in places.into_iter().map(|place| &smoothed[place]) {
+        for sample in &smoothed {
             values.extend_from_slice(sample.state.as_slice());
             deviations.extend(sample.covariance.diagonal().iter().map(|variance| variance.sqrt()));
         }
@@ -110,4 +109,29 @@ impl StateFilter {
         }
         Ok(SmoothedStates { states, parameters, values, deviations })
     }
+}
+
+/// The states of rows, each with the step before it.
+fn smoothed<S: Recursion>(
+    kind: &Kind,
+    mut smoother: S,
+    history: &[(Option<Division>, Sample)],
+    smooth: impl FnOnce(&S) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error>,
+) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error> {
+    let (mut past, mut work) = (Past::new(kind), Work::new());
+    // Which of the smoother's samples a row is.
+    let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
+    let mut previous = None;
+    for (division, sample) in history {
+        past.push(sample);
+        if let Some((previous, division)) = previous.zip(*division) {
+            kind.predict(&mut smoother, previous, sample, division, (&past, &mut work))?;
+            place += division.0;
+        }
+        kind.correct(&mut smoother, sample, (&past, &mut work), |_| ())?;
+        places.push(place);
+        previous = Some(sample);
+    }
+    let all = smooth(&smoother)?;
+    Ok(places.into_iter().filter_map(|place| all.get(place).cloned()).collect())
 }

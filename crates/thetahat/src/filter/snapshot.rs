@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::DVector;
 
 use super::StateFilter;
 use super::estimator::Engine;
-use super::kind::{Filter, Observer, Sample};
+use super::kind::{Filter, Observer, Sample, Unscented};
 use super::past::Past;
 use super::row::{Row, Told};
 use super::totals::Totals;
@@ -32,6 +32,7 @@ pub struct FilterSnapshot {
 #[derive(Debug, Clone, Serialize, Deserialize)]
 enum EngineSnapshot {
     Filter(Filter),
+    Unscented(Unscented),
     Observer(Observer),
 }
 
@@ -63,6 +64,7 @@ impl StateFilter {
             origin: self.origin,
             engine: match &self.engine {
                 Engine::Filter(filter) => EngineSnapshot::Filter(filter.clone()),
+                Engine::Unscented(filter) => EngineSnapshot::Unscented(filter.clone()),
                 Engine::Observer { observer, .. } => EngineSnapshot::Observer(observer.clone()),
             },
             previous: self.previous.as_ref().map(|Sample { time, inputs, outputs }| SampleSnapshot {
@@ -93,6 +95,7 @@ impl StateFilter {
         let has_size = |sample: &Sample| (sample.inputs.len(), sample.outputs.len()) == (inputs, outputs);
         let fits = match (&engine, &self.engine) {
             (EngineSnapshot::Filter(filter), Engine::Filter(_)) => filter.state().len() == states,
+            (EngineSnapshot::Unscented(filter), Engine::Unscented(_)) => filter.state().len() == states,
             (EngineSnapshot::Observer(observer), Engine::Observer { .. }) => {
                 observer.state().len() == states && observer.gain().ncols() == outputs
             }
@@ -110,6 +113,7 @@ impl StateFilter {
         };
         match (engine, &mut self.engine) {
             (EngineSnapshot::Filter(kept), Engine::Filter(filter)) => *filter = kept,
+            (EngineSnapshot::Unscented(kept), Engine::Unscented(filter)) => *filter = kept,
             (EngineSnapshot::Observer(kept), Engine::Observer { observer, .. }) => *observer = kept,
             // Seen above.
             _ => {}

@@ -1,8 +1,8 @@
-use thetahat_core::nalgebra::{DMatrix, DVector};
+use thetahat_core::nalgebra::DVector;
 
 use super::estimate::StateEstimate;
 use super::estimator::{Engine, Estimator};
-use super::kind::{Division, Sample};
+use super::kind::{Division, Gaussian, Kind, Sample};
 use super::linearization::Work;
 use super::model::StateModel;
 use super::past::Past;
@@ -199,18 +199,10 @@ impl StateFilter {
         past.push(&sample);
         let told = match &mut engine {
             Engine::Filter(filter) => {
-                if let Some((previous, division)) = from {
-                    kind.predict(filter, previous, &sample, division, (&past, work)).map_err(refused)?;
-                }
-                next.predicted(filter).map_err(refused)?;
-                let show = |outputs: &DVector<f64>, h: &DMatrix<f64>, noise: &DMatrix<f64>| {
-                    next.seen(outputs, &sample);
-                    next.output_deviations(h, noise);
-                };
-                let innovation = kind.correct(filter, &sample, (&past, work), show).map_err(refused)?;
-                next.filtered(filter);
-                next.parameters(kind);
-                Told::of(&innovation)
+                filtered(kind, filter, from, &sample, next, (&past, work)).map_err(refused)?
+            }
+            Engine::Unscented(filter) => {
+                filtered(kind, filter, from, &sample, next, (&past, work)).map_err(refused)?
             }
             Engine::Observer { observer, poles } => {
                 if let Some((previous, division)) = from {
@@ -234,7 +226,7 @@ impl StateFilter {
         }
         self.previous = Some(sample);
         let told = self.told.insert(told);
-        let certain = matches!(self.engine, Engine::Filter(_));
+        let certain = !matches!(self.engine, Engine::Observer { .. });
         let estimate = self.row.estimate(row, time, certain, told);
         self.totals.add(&estimate);
         Ok(estimate)
@@ -254,6 +246,25 @@ impl StateFilter {
             DVector::from_fn(outputs.len(), |index, _| outputs[index] - offset(output_offsets, index));
         Sample { time, inputs, outputs }
     }
+}
+
+/// A row as a filter takes it, from the row before over this step.
+fn filtered(
+    kind: &Kind,
+    filter: &mut impl Gaussian,
+    from: Option<(&Sample, Division)>,
+    sample: &Sample,
+    row: &mut Row,
+    (past, work): (&Past, &mut Work),
+) -> Result<Told, thetahat_core::Error> {
+    if let Some((previous, division)) = from {
+        kind.predict(filter, previous, sample, division, (past, work))?;
+    }
+    row.predicted(filter)?;
+    let innovation = kind.correct(filter, sample, (past, work), |expected| row.expected(expected, sample))?;
+    row.filtered(filter);
+    row.parameters(kind);
+    Ok(Told::of(&innovation))
 }
 
 /// That there are as many values as channels, and that none is infinite.

@@ -14,7 +14,7 @@ pub struct FilterSummary {
     pub schema: String,
     /// The program and version that wrote it.
     pub generator: String,
-    /// `kalman`, `ekf` or `luenberger`, as it was asked for.
+    /// `kalman`, `ekf`, `iekf`, `ukf` or `luenberger`, as it was asked for.
     pub estimator: String,
     /// The rows.
     pub rows: usize,

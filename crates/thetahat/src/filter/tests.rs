@@ -6,6 +6,7 @@ mod refusals;
 mod reports;
 mod smoothing;
 mod snapshots;
+mod unscented;
 
 use crate::filter::{Estimator, StateFilter, StateModel};
 

@@ -14,6 +14,8 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
     let estimator = match summary.estimator.as_str() {
         "kalman" => "Kalman filter",
         "ekf" => "extended Kalman filter",
+        "iekf" => "iterated extended Kalman filter",
+        "ukf" => "unscented Kalman filter",
         _ => "Luenberger observer",
     };
     on.line(format!("{estimator}: {} rows{faults}, {} values measured", summary.rows, summary.measured));

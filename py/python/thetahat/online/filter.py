@@ -222,9 +222,10 @@ class StateFilter:
     model : Model, StateModel or GreyBox
         The model: of a fit, in innovations form, with its offsets, or where it is a nonlinear ARX model with its lags as the state, as
         deviations from the offsets; or in matrices or equations.
-    estimator : {"kalman", "ekf", "luenberger"}, optional
+    estimator : {"kalman", "ekf", "iekf", "ukf", "luenberger"}, optional
         How to estimate: "kalman" for a linear model, else "ekf", the extended Kalman filter, which estimates unknown parameters
-        with the state. "luenberger" is an observer, with ``poles`` or ``gain``.
+        with the state. "iekf" iterates its corrections, for accurate measurements of what bends; "ukf" is the unscented
+        filter, whose deviations know how the model bends. "luenberger" is an observer, with ``poles`` or ``gain``.
     initial : {"unknown", "zero"}, optional
         The initial state of a `Model`: unknown, so that it is estimated from the first rows, which is the default; or at rest, with its
         channels at their offsets. Equations and matrices have an initial state of their own.
@@ -254,7 +255,8 @@ class StateFilter:
 
     References
     ----------
-    Anderson and Moore, Optimal Filtering, 1979. Luenberger, An introduction to observers, 1971.
+    Anderson and Moore, Optimal Filtering, 1979. Luenberger, An introduction to observers, 1971. Bell and Cathey, The iterated
+    Kalman filter update as a Gauss-Newton method, 1993. Julier and Uhlmann, Unscented filtering and nonlinear estimation, 2004.
 
     Examples
     --------
@@ -274,7 +276,7 @@ class StateFilter:
     def __init__(
         self,
         model: Model | StateModel | GreyBox,
-        estimator: Literal["kalman", "ekf", "luenberger"] | None = None,
+        estimator: Literal["kalman", "ekf", "iekf", "ukf", "luenberger"] | None = None,
         *,
         initial: Initial | None = None,
         measurement_noise: npt.ArrayLike | None = None,

@@ -120,12 +120,12 @@ fn what_is_not_linear_needs_the_extended_filter() {
     };
     assert_eq!(
         refused(CART),
-        "estimator: the model has unknown parameters (mass): use the extended Kalman filter (ekf)"
+        "estimator: the model has unknown parameters (mass): use the extended Kalman filter (ekf) or the unscented one (ukf)"
     );
     let bent = "sample_time = 1\n[states]\nx = { sd = 1 }\n[next]\nx = 'sin(x)'\n[outputs]\ny = 'x'\n[noise]\nmeasurement.y = 1";
     assert_eq!(
         refused(bent),
-        "estimator: the model is not linear in its state: use the extended Kalman filter (ekf)"
+        "estimator: the model is not linear in its state: use the extended Kalman filter (ekf) or the unscented one (ukf)"
     );
 }
 

@@ -184,6 +184,10 @@ fn an_observer_has_the_poles_or_the_gain_asked_for() {
         ("--estimator luenberger --gain nan;0", "--gain: it must be finite"),
         ("--estimator luenberger --gain 1;a", "--gain 1;a: write numbers"),
         ("--estimator luenberger --gain 1;1 --smooth", "--smooth: an observer"),
+        ("--estimator bounded --smooth", "--smooth: a set for bounded noise"),
+        ("--deviations 3", "--deviations is for --estimator bounded"),
+        ("--estimator bounded --deviations 0", "--deviations: 0 is no number above 0"),
+        ("--estimator bounded", "process_bound, measurement_bound and initial_bound"),
     ] {
         folder.assert_refused(&format!("filter model.toml log.csv {options}"), 2, words);
     }
@@ -507,4 +511,76 @@ fn models_that_make_no_sense_are_refused_where_they_do_not() {
     folder.write("idle.toml", idle.replace("\"position\"", "\"position + 0 * idle\""));
     let message = folder.refused("fit --grey idle.toml log.csv --time t", 4);
     assert!(message.contains("idle") && !message.contains("mass"), "{message}");
+}
+
+const TANK: &str = "sample_time = 1
+states = ['level']
+outputs = ['y']
+F = [[1]]
+H = [[1]]
+process_bound = [0.1]
+measurement_bound = [1]
+initial_bound = [100]
+";
+
+#[test]
+fn a_level_with_bounded_noise() {
+    let folder = Folder::with_log("y\n3\n4\n3.5\n9\n");
+    folder.write("tank.toml", TANK);
+    let answer = folder.done("filter tank.toml log.csv --estimator bounded --summary summary.json");
+    let lines = objects(&answer.stdout);
+    // By hand: 3 ± 1; wider by 0.1, cut by 4 ± 1; wider by 0.1, within 3.5 ± 1; and 9 is out of reach.
+    for (line, [low, high]) in lines.iter().zip([[2.0, 4.0], [3.0, 4.1], [2.9, 4.2], [2.8, 4.3]]) {
+        close(number(line, "/level_low"), low, 1e-9);
+        close(number(line, "/level_high"), high, 1e-9);
+        close(number(line, "/level"), f64::midpoint(low, high), 1e-9);
+    }
+    let told: Vec<_> = lines.iter().map(|line| (&line["action"], &line["contradicts"])).collect();
+    assert_eq!(told[2], (&"updated".into(), &"".into()));
+    assert_eq!(told[3], (&"gated".into(), &"y".into()));
+    assert!(answer.stderr.contains("1 row is explained by no state within the bounds"), "{}", answer.stderr);
+    let summary: Value = serde_json::from_str(&folder.read("summary.json")).expect("it is JSON");
+    assert_eq!((&summary["estimator"], &summary["contradictions"]), (&"bounded".into(), &1.into()));
+    close(number(&summary, "/states/0/bound"), 0.75, 1e-9);
+    // Without covariances the noise is uniform.
+    let kalman = filtered(&folder, "tank.toml log.csv");
+    close(number(&kalman[0], "/level_predicted_sd"), 100.0 / 3.0_f64.sqrt(), 1e-9);
+}
+
+#[test]
+fn a_report_with_bounds_of_three_deviations() {
+    let folder = folder_with("nile.csv");
+    folder.done("fit log.csv --model arma --na 1 --nc 1 --report model.json");
+    let lines = filtered(&folder, "model.json log.csv --estimator bounded --deviations 4");
+    assert!(lines.iter().all(|line| line["contradicts"] == ""));
+    let width = |line: &Value| number(line, "/x1_high") - number(line, "/x1_low");
+    assert!(width(&lines[20]) < width(&lines[0]));
+}
+
+#[test]
+fn the_unscented_and_the_iterated_filter() {
+    let folder = example("mass_spring_damper");
+    let ekf = summary(&folder, "model.toml log.csv --estimator ekf");
+    for estimator in ["iekf", "ukf"] {
+        let found = summary(&folder, &format!("model.toml log.csv --estimator {estimator}"));
+        assert_eq!(found["estimator"], estimator);
+        // It bends little within its deviations, so that all agree within one.
+        for one in ekf["states"].as_array().into_iter().flatten() {
+            let name = one["name"].as_str().unwrap_or_default();
+            let ((value, deviation), (other, _)) =
+                (estimate(&ekf, "states", name), estimate(&found, "states", name));
+            assert!((value - other).abs() < deviation, "{estimator} {name}: {value} {other} {deviation}");
+        }
+        assert_eq!(found["rows"], ekf["rows"]);
+    }
+    let nile = folder_with("nile.csv");
+    nile.write("nile.toml", NILE);
+    let kalman = filtered(&nile, "nile.toml log.csv --smooth");
+    let unscented = filtered(&nile, "nile.toml log.csv --smooth --estimator ukf");
+    for (kalman, unscented) in kalman.iter().zip(&unscented) {
+        for name in ["/level", "/level_sd", "/level_smoothed", "/level_smoothed_sd", "/nis"] {
+            let expected = number(kalman, name);
+            close(number(unscented, name), expected, 1e-9 * (1.0 + expected.abs()));
+        }
+    }
 }

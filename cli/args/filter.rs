@@ -32,6 +32,9 @@ pub(crate) struct FilterArguments {
         help_heading = "Estimator"
     )]
     pub(crate) measurement_noise: Vec<f64>,
+    /// Bounds of noises as so many standard deviations, for a model that says no bounds (bounded)
+    #[arg(long, value_name = "K", allow_hyphen_values = true, help_heading = "Estimator")]
+    pub(crate) deviations: Option<f64>,
     /// The poles of the error of the observer in the z plane, such as 0.4+0.3i,0.4-0.3i
     #[arg(
         long,
@@ -79,6 +82,8 @@ pub(crate) enum EstimatorArgument {
     Iekf,
     /// The unscented Kalman filter: as ekf, and its deviations know how the model bends
     Ukf,
+    /// A set in which the state is for certain while noises keep their bounds (linear models)
+    Bounded,
     /// The Luenberger observer, with --poles or --gain
     Luenberger,
 }

@@ -53,8 +53,15 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
     if stopped { Err(Failure::interrupted()) } else { Ok(()) }
 }
 
-/// What to think of normalised innovations that are far from what the model says.
+/// What to think of normalised innovations that are far from what the model says, and of rows that contradict it.
 pub fn consistency(summary: &FilterSummary) -> Option<String> {
+    if let Some(count) = summary.contradictions.filter(|count| *count > 0) {
+        let rows = if count == 1 { "1 row is".to_owned() } else { format!("{count} rows are") };
+        return Some(format!(
+            "{rows} explained by no state within the bounds, and not used: a noise is larger than its bound, a sensor has \
+             failed, or the model is wrong; 'contradicts' names the output"
+        ));
+    }
     let nis = summary.nis.as_ref()?;
     let ratio = nis.mean / nis.expected;
     let advice = match ratio {

@@ -46,12 +46,21 @@ impl FilterJob {
             (Some(EstimatorArgument::Ekf), None) => Some(Estimator::Extended),
             (Some(EstimatorArgument::Iekf), None) => Some(Estimator::Iterated),
             (Some(EstimatorArgument::Ukf), None) => Some(Estimator::Unscented),
+            (Some(EstimatorArgument::Bounded), None) => {
+                Some(Estimator::Bounded { deviations: arguments.deviations })
+            }
             (None, None) => None,
         };
-        if arguments.smooth && matches!(estimator, Some(Estimator::Luenberger(_))) {
-            return Err(Failure::usage(
-                "--smooth: an observer knows no covariance; use kalman, ekf, iekf or ukf",
-            ));
+        if arguments.deviations.is_some() && !matches!(estimator, Some(Estimator::Bounded { .. })) {
+            return Err(Failure::usage("--deviations is for --estimator bounded"));
+        }
+        let reason = match estimator {
+            Some(Estimator::Luenberger(_)) => Some("an observer knows no covariance"),
+            Some(Estimator::Bounded { .. }) => Some("a set for bounded noise is not smoothed"),
+            _ => None,
+        };
+        if let Some(reason) = reason.filter(|_| arguments.smooth) {
+            return Err(Failure::usage(format!("--smooth: {reason}; use kalman, ekf, iekf or ukf")));
         }
         if arguments.clock.time.is_some() && sample_time.is_some() {
             return Err(Failure::usage(

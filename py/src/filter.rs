@@ -108,13 +108,13 @@ pub(crate) struct StateFilter {
 
 /// The numbers of the rows so far.
 struct Record<'a> {
-    columns: [Column<'a>; 12],
+    columns: [Column<'a>; 16],
     codes: Vec<u8>,
     held: Vec<bool>,
 }
 
 /// Arrays of a run with one row for each row of the log: what [`Record`] writes.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 16] = [
     "predicted",
     "predicted_deviations",
     "filtered",
@@ -127,23 +127,33 @@ const COLUMNS: [&str; 12] = [
     "nis",
     "nis_bounds",
     "log_likelihoods",
+    "predicted_bounds",
+    "filtered_bounds",
+    "output_bounds",
+    "contradictions",
 ];
 
 /// The numbers of a row in the order of [`COLUMNS`]; what an observer does not know is NaN.
 fn numbers<'a>(
     estimate: &'a StateEstimate<'_>,
     unknown: &'a [f64],
-    scalars: &'a mut [f64; 4],
-) -> [&'a [f64]; 12] {
+    scalars: &'a mut [f64; 5],
+) -> [&'a [f64]; 16] {
+    fn bounds<'a>(values: &StateValues<'a>, unknown: &'a [f64]) -> &'a [f64] {
+        values.bounds.unwrap_or(&unknown[..values.values.len()])
+    }
     fn deviations<'a>(values: &StateValues<'a>, unknown: &'a [f64]) -> &'a [f64] {
         values.standard_deviations.unwrap_or(&unknown[..values.values.len()])
     }
     let (low, high) = estimate.nis_bounds.unwrap_or((f64::NAN, f64::NAN));
-    *scalars = [estimate.nis.unwrap_or(f64::NAN), low, high, estimate.log_likelihood.unwrap_or(f64::NAN)];
+    let contradiction = estimate.contradiction.map_or(-1.0, |output| output as f64);
+    let [nis, log_likelihood] = [estimate.nis, estimate.log_likelihood].map(|one| one.unwrap_or(f64::NAN));
+    *scalars = [nis, low, high, log_likelihood, contradiction];
     let StateEstimate { predicted, parameters, outputs, .. } = estimate;
-    let (filtered, filtered_deviations) = match &estimate.filtered {
-        Some(filtered) => (filtered.values, deviations(filtered, unknown)),
-        None => (&unknown[..predicted.values.len()], &unknown[..predicted.values.len()]),
+    let none = &unknown[..predicted.values.len()];
+    let (filtered, filtered_deviations, filtered_bounds) = match &estimate.filtered {
+        Some(filtered) => (filtered.values, deviations(filtered, unknown), bounds(filtered, unknown)),
+        None => (none, none, none),
     };
     [
         predicted.values,
@@ -157,7 +167,11 @@ fn numbers<'a>(
         estimate.innovations,
         &scalars[..1],
         &scalars[1..3],
-        &scalars[3..],
+        &scalars[3..4],
+        bounds(predicted, unknown),
+        filtered_bounds,
+        bounds(outputs, unknown),
+        &scalars[4..],
     ]
 }
 
@@ -167,11 +181,12 @@ impl StateFilter {
     /// A filter before its first row: the word of the estimator or none; of an observer its poles, real and imaginary
     /// parts, or its gain.
     #[new]
-    #[pyo3(signature = (model, estimator, poles, gain))]
+    #[pyo3(signature = (model, estimator, deviations, poles, gain))]
     fn new(
         py: Python<'_>,
         model: &StateModel,
         estimator: Option<&str>,
+        deviations: Option<f64>,
         poles: Option<(Vec<f64>, Vec<f64>)>,
         gain: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -195,23 +210,27 @@ impl StateFilter {
             }
             (None, None) => None,
         };
+        if deviations.is_some() && estimator != Some("bounded") {
+            return Err(PyValueError::new_err("deviations are for estimator 'bounded'"));
+        }
         let estimator = match (estimator, gain) {
             (Some("luenberger"), Some(gain)) => Estimator::Luenberger(gain),
             (Some("luenberger"), None) => {
                 return Err(PyValueError::new_err("estimator: 'luenberger' needs poles or gain"));
             }
-            (Some("kalman" | "ekf" | "iekf" | "ukf") | None, Some(_)) => {
+            (Some("kalman" | "ekf" | "iekf" | "ukf" | "bounded") | None, Some(_)) => {
                 return Err(PyValueError::new_err("poles and gain are for estimator 'luenberger'"));
             }
             (Some("kalman"), None) => Estimator::Kalman,
             (Some("ekf"), None) => Estimator::Extended,
             (Some("iekf"), None) => Estimator::Iterated,
             (Some("ukf"), None) => Estimator::Unscented,
+            (Some("bounded"), None) => Estimator::Bounded { deviations },
             (None, None) if model.is_linear() => Estimator::Kalman,
             (None, None) => Estimator::Extended,
             (Some(other), _) => {
                 return Err(PyValueError::new_err(format!(
-                    "estimator: '{other}' is none of 'kalman', 'ekf', 'iekf', 'ukf', 'luenberger'"
+                    "estimator: '{other}' is none of 'kalman', 'ekf', 'iekf', 'ukf', 'bounded', 'luenberger'"
                 )));
             }
         };
@@ -267,11 +286,12 @@ impl StateFilter {
     fn latest<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Some(estimate) = self.filter.latest() else { return Ok(None) };
         let unknown = self.unknown();
-        let mut scalars = [0.0; 4];
+        let mut scalars = [0.0; 5];
         let found = PyDict::new(py);
         for (name, values) in COLUMNS.into_iter().zip(numbers(&estimate, &unknown, &mut scalars)) {
             match (name, values) {
                 ("nis", [nis]) => found.set_item(name, nis)?,
+                ("contradictions", [output]) => found.set_item("contradiction", *output as i64)?,
                 ("log_likelihoods", [log_likelihood]) => found.set_item("log_likelihood", log_likelihood)?,
                 _ => found.set_item(name, PyArray1::from_slice(py, values))?,
             }
@@ -331,6 +351,10 @@ impl StateFilter {
             vec![rows],
             each(2),
             vec![rows],
+            each(n),
+            each(n),
+            each(m),
+            vec![rows],
             given(n),
             given(n),
             given(p),
@@ -351,16 +375,23 @@ impl StateFilter {
                 j,
                 l,
                 o,
+                q,
+                r,
+                s,
+                t,
                 mut states,
                 mut state_deviations,
                 mut parameters,
                 mut parameter_deviations,
             ] = columns;
-            let mut record =
-                Record { columns: [a, b, c, d, e, f, g, h, i, j, l, o], codes: Vec::new(), held: Vec::new() };
+            let mut record = Record {
+                columns: [a, b, c, d, e, f, g, h, i, j, l, o, q, r, s, t],
+                codes: Vec::new(),
+                held: Vec::new(),
+            };
             py.detach(|| {
                 let mut pulse = Pulse::new((n + p).pow(3));
-                let mut scalars = [0.0; 4];
+                let mut scalars = [0.0; 5];
                 for at in 0..rows {
                     pulse.check()?;
                     let step =

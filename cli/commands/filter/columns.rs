@@ -12,6 +12,9 @@ pub(super) struct Columns {
     has_time: bool,
     /// Whether there is no noise, and so neither a corrected state nor a standard deviation.
     observes: bool,
+    /// Whether noise is bounded, so that there are intervals instead of standard deviations.
+    bounded: bool,
+    outputs: Vec<String>,
     inputs: Vec<String>,
 }
 
@@ -28,16 +31,24 @@ impl Columns {
             names.extend(suffixes.iter().chain(smoothed).map(|suffix| format!("{name}{suffix}")));
         };
         let observes = matches!(job.estimator(model), Estimator::Luenberger(_));
-        let of_state: &[&str] =
-            if observes { &["_predicted"] } else { &["", "_sd", "_predicted", "_predicted_sd"] };
+        let bounded = matches!(job.estimator(model), Estimator::Bounded { .. });
+        if bounded {
+            add("contradicts", &[""]);
+        }
+        let of_state: &[&str] = match (observes, bounded) {
+            (true, _) => &["_predicted"],
+            (_, true) => &["", "_low", "_high", "_predicted", "_predicted_low", "_predicted_high"],
+            _ => &["", "_sd", "_predicted", "_predicted_sd"],
+        };
         model.states().iter().for_each(|state| add(state, of_state));
         model.unknown().for_each(|parameter| add(parameter, &["", "_sd"]));
         for output in model.outputs() {
-            let parts = [("measured", ""), ("predicted", ""), ("innovation", ""), ("innovation", "_sd")];
+            let last = if bounded { "_bound" } else { "_sd" };
+            let parts = [("measured", ""), ("predicted", ""), ("innovation", ""), ("innovation", last)];
             let parts = if observes { &parts[..3] } else { &parts[..] };
             names.extend(parts.iter().map(|(part, suffix)| format!("{part}_{output}{suffix}")));
         }
-        if !observes {
+        if !observes && !bounded {
             names.extend(["nis", "nis_low", "nis_high", "log_likelihood"].map(str::to_owned));
         }
         names.extend((!model.inputs().is_empty()).then(|| "held".to_owned()));
@@ -48,7 +59,8 @@ impl Columns {
                 job.model.display()
             )));
         }
-        Ok(Self { names, has_time, observes, inputs: model.inputs().to_vec() })
+        let (inputs, outputs) = (model.inputs().to_vec(), model.outputs().to_vec());
+        Ok(Self { names, has_time, observes, bounded, inputs, outputs })
     }
 
     pub(super) fn names(&self) -> &[String] {
@@ -71,9 +83,18 @@ impl Columns {
                 cells.number(time.unwrap_or(f64::NAN));
             }
             cells.word(estimate.action.word());
+            if self.bounded {
+                let output = estimate.contradiction.and_then(|output| self.outputs.get(output));
+                cells.word(output.map_or("", String::as_str));
+            }
             for index in 0..estimate.predicted.values.len() {
                 if self.observes {
                     cells.number(at(estimate.predicted.values, index));
+                    continue;
+                }
+                if self.bounded {
+                    interval(cells, estimate.filtered.as_ref(), index);
+                    interval(cells, Some(&estimate.predicted), index);
                     continue;
                 }
                 pair(cells, estimate.filtered.as_ref(), index);
@@ -92,11 +113,12 @@ impl Columns {
                 cells.number(measured);
                 cells.number(at(estimate.outputs.values, index));
                 cells.number(at(estimate.innovations, index));
-                if let Some(deviations) = estimate.outputs.standard_deviations {
-                    cells.number(at(deviations, index));
+                let StateValues { standard_deviations, bounds, .. } = estimate.outputs;
+                if let Some(numbers) = standard_deviations.or(bounds) {
+                    cells.number(at(numbers, index));
                 }
             }
-            if self.observes {
+            if self.observes || self.bounded {
                 return self.held(cells, estimate);
             }
             cells.number(estimate.nis.unwrap_or(f64::NAN));
@@ -122,6 +144,13 @@ impl Columns {
 fn pair(cells: &mut Cells<'_>, values: Option<&StateValues<'_>>, index: usize) {
     cells.number(at(values.map_or(&[], |values| values.values), index));
     cells.number(at(values.and_then(|values| values.standard_deviations).unwrap_or_default(), index));
+}
+
+/// A value, and between which numbers it is.
+fn interval(cells: &mut Cells<'_>, values: Option<&StateValues<'_>>, index: usize) {
+    let value = at(values.map_or(&[], |values| values.values), index);
+    let bound = at(values.and_then(|values| values.bounds).unwrap_or_default(), index);
+    [value, value - bound, value + bound].into_iter().for_each(|number| cells.number(number));
 }
 
 fn at(values: &[f64], index: usize) -> f64 {

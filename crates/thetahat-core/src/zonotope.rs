@@ -130,6 +130,11 @@ impl<T: Real, N: Dimension + Dimension<G>, G: Dimension> ZonotopeFilter<T, N, G>
         reaches
     }
 
+    /// How many generators it holds at most.
+    pub fn capacity(&self) -> usize {
+        self.generators.ncols()
+    }
+
     /// The generators in use, one after the other, n numbers each.
     pub fn generators(&self) -> &[T] {
         self.generators.as_slice().get(..self.used * self.centre.len()).unwrap_or_default()
@@ -204,11 +209,11 @@ impl<T: Real, N: Dimension + Dimension<G>, G: Dimension> ZonotopeFilter<T, N, G>
         let (mut bound, mut action, mut contradiction) = (error.clone(), Action::Missing, None);
         let outputs = error.as_slice().iter().zip(bounds.as_slice()).zip(bound.as_mut_slice());
         for (output, ((error, &noise), bound)) in outputs.enumerate() {
+            let row = column(observation.output_rows().as_slice(), n, output);
+            *bound = self.reach(row) + noise;
             if is_missing(error) {
                 continue;
             }
-            let row = column(observation.output_rows().as_slice(), n, output);
-            *bound = self.reach(row) + noise;
             if action != Action::Gated {
                 let moved = row.iter().zip(next.centre.as_slice()).zip(self.centre.as_slice());
                 let moved = moved.fold(T::zero(), |sum, ((&h, &now), &before)| sum + h * (now - before));

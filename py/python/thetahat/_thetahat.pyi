@@ -254,6 +254,7 @@ class StateFilter:
         cls,
         model: StateModel,
         estimator: str | None,
+        deviations: float | None,
         poles: tuple[Sequence[float], Sequence[float]] | None,
         gain: ArrayLike | None,
     ) -> StateFilter: ...

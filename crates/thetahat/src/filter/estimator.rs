@@ -1,5 +1,6 @@
 use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 
+use super::bounded::Bounded;
 use super::kind::{Filter, Kind, Motion, Observer, Unscented};
 use super::model::StateModel;
 use crate::Error;
@@ -21,6 +22,14 @@ pub enum Estimator {
     /// The unscented Kalman filter: for any model. Its deviations know how the model bends within them. Unknown
     /// parameters are estimated with the state. See [`UnscentedKalmanFilter`](thetahat_core::UnscentedKalmanFilter).
     Unscented,
+    /// A set in which the state is for certain as long as noises keep their bounds, for a linear model in matrices, or a
+    /// report of polynomials or state space: see [`ZonotopeFilter`](thetahat_core::ZonotopeFilter). A row that no state of
+    /// the set explains is told, see [`contradiction`](super::StateEstimate::contradiction), and is not used.
+    Bounded {
+        /// So many standard deviations of its noises bound those of a model that says no bounds; of a Gaussian noise
+        /// none is exceeded for certain.
+        deviations: Option<f64>,
+    },
     /// The Luenberger observer, for a model without unknown parameters: see
     /// [`LuenbergerObserver`](thetahat_core::LuenbergerObserver).
     Luenberger(ObserverGain),
@@ -48,6 +57,7 @@ impl Estimator {
             Self::Extended => "ekf",
             Self::Iterated => "iekf",
             Self::Unscented => "ukf",
+            Self::Bounded { .. } => "bounded",
             Self::Luenberger(_) => "luenberger",
         }
     }
@@ -61,10 +71,30 @@ const ITERATIONS: usize = 10;
 pub(super) enum Engine {
     Filter(Filter),
     Unscented(Unscented),
+    Bounded(Bounded),
     Observer { observer: Observer, poles: Option<DVector<Complex<f64>>> },
 }
 
+/// What an estimator says beside its estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Certainty {
+    /// Standard deviations.
+    Deviations,
+    /// How far at most the state is from them.
+    Bounds,
+    Nothing,
+}
+
 impl Engine {
+    /// What it says beside an estimate.
+    pub(super) fn certainty(&self) -> Certainty {
+        match self {
+            Self::Filter(_) | Self::Unscented(_) => Certainty::Deviations,
+            Self::Bounded(_) => Certainty::Bounds,
+            Self::Observer { .. } => Certainty::Nothing,
+        }
+    }
+
     pub(super) fn new(model: &StateModel, estimator: Estimator) -> Result<Self, Error> {
         let filter = model.kind.started().map_err(|error| Error::argument("start", error.to_string()))?;
         let unknown: Vec<&str> = model.unknown().collect();
@@ -87,6 +117,7 @@ impl Engine {
                 let unscented = Unscented::new(filter.state().clone(), filter.covariance().clone());
                 Ok(Self::Unscented(unscented.map_err(|error| Error::argument("start", error.to_string()))?))
             }
+            Estimator::Bounded { deviations } => Ok(Self::Bounded(Bounded::new(&model.kind, deviations)?)),
             Estimator::Luenberger(_) if !unknown.is_empty() => Err(Error::argument(
                 "estimator",
                 format!(

@@ -30,6 +30,15 @@ pub(super) struct Sample {
     pub(super) outputs: DVector<f64>,
 }
 
+impl Sample {
+    /// What drives a state where the noises are correlated: inputs, and outputs that are there.
+    pub(super) fn drives(&self) -> DVector<f64> {
+        let outputs = self.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
+        let drives: Vec<f64> = self.inputs.iter().copied().chain(outputs).collect();
+        drives.into()
+    }
+}
+
 /// How the time from one row to the next is taken: how many steps, and the seconds of each.
 pub(super) type Division = (usize, f64);
 
@@ -191,10 +200,7 @@ impl Kind {
                     let there: Vec<bool> = from.outputs.iter().map(|output| !output.is_nan()).collect();
                     let mut left = count;
                     if let Some(transition) = linear.after(frame, &there)? {
-                        let outputs =
-                            from.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
-                        let drives: Vec<f64> = from.inputs.iter().copied().chain(outputs).collect();
-                        filter.predict(transition.as_ref(), &drives.into())?;
+                        filter.predict(transition.as_ref(), &from.drives())?;
                         left -= 1;
                     }
                     for _ in 0..left {

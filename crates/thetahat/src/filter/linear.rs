@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearTransition};
 
+use super::bounded::Bounds;
 use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
 use crate::model::{Signal, StateSpace};
@@ -21,6 +22,8 @@ pub(super) struct Linear {
     /// F, G and Q.
     pub(super) transition: Transition,
     correlation: Option<Correlation>,
+    /// How large the noises are at most, where that is said.
+    pub(super) bounds: Option<Bounds>,
 }
 
 /// How the noises are correlated, if they are.
@@ -48,6 +51,7 @@ pub(super) struct Matrices {
     pub(super) s: Option<DMatrix<f64>>,
     pub(super) x0: DVector<f64>,
     pub(super) p0: Covariance<f64, Dyn>,
+    pub(super) bounds: Option<Bounds>,
 }
 
 impl Linear {
@@ -60,18 +64,18 @@ impl Linear {
         matrices: Matrices,
         gain: Option<DMatrix<f64>>,
     ) -> Result<(Frame, Self), thetahat_core::Error> {
-        let Matrices { f, g, h, d, q, r, s, x0, p0 } = matrices;
+        let Matrices { f, g, h, d, q, r, s, x0, p0, bounds } = matrices;
         let noise = q.matrix();
         let innovations = gain.map(|gain| (gain, r.clone()));
         let transition = LinearTransition::new(f, q)?.with_input(g)?;
         let frame = Frame::new(names, (x0, p0), (h, d, r))?;
         let Some(cross) = s.filter(|cross| cross.iter().any(|entry| *entry != 0.0)) else {
-            return Ok((frame, Self { transition, correlation: None }));
+            return Ok((frame, Self { transition, correlation: None, bounds }));
         };
         let mut correlation = Correlation { cross, noise, innovations, full: transition.clone() };
         let all = vec![true; frame.names.outputs.len()];
         correlation.full = decorrelated(&transition, &correlation, &frame, &all)?;
-        Ok((frame, Self { transition, correlation: Some(correlation) }))
+        Ok((frame, Self { transition, correlation: Some(correlation), bounds }))
     }
 
     /// A fitted model in innovations form: Q = K R K', S = K R, R = cov e.
@@ -106,12 +110,18 @@ impl Linear {
             };
             let x0 = DVector::zeros(n);
             let StateSpace { f, g, h, d, .. } = space.clone();
-            Linear::of_matrices(names, Matrices { f, g, h, d, q, r, s, x0, p0 }, Some(space.k.clone()))
+            let matrices = Matrices { f, g, h, d, q, r, s, x0, p0, bounds: None };
+            Linear::of_matrices(names, matrices, Some(space.k.clone()))
         };
         let (frame, linear) =
             build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
         let offsets = |signals: &[Signal]| signals.iter().map(|signal| signal.offset).collect();
         Ok((Frame { input_offsets: offsets(inputs), output_offsets: offsets(outputs), ..frame }, linear))
+    }
+
+    /// Whether S is not zero.
+    pub(super) fn is_correlated(&self) -> bool {
+        self.correlation.is_some()
     }
 
     /// The transition after a row with these outputs there, and what drives it.

@@ -3,6 +3,7 @@
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
+use super::bounded::Bounds;
 use super::frame::{Frame, Names};
 use super::linear::{Linear, Matrices};
 use crate::Error;
@@ -27,6 +28,9 @@ pub(super) fn read(root: &Section<'_>) -> Result<(Frame, Linear), Error> {
         "S",
         "x0",
         "P0",
+        "process_bound",
+        "measurement_bound",
+        "initial_bound",
     ])?;
     let sample_time = root.require("sample_time", "the seconds of a sample")?.positive()?;
     let needed = root.require("F", "the state matrix, such as [[1, 1], [0, 1]]")?;
@@ -62,6 +66,15 @@ pub(super) fn read(root: &Section<'_>) -> Result<(Frame, Linear), Error> {
         let entry = root.require(key, what)?;
         covariance(&entry, matrix(&entry, (size, size))?)
     };
+    let bounds = bounds(root, size, outputs.len())?;
+    // Without a covariance the noise is uniform within its bound.
+    let noise = |key: &str, what: &str, size, bound: Option<&DVector<f64>>| match (bound, root.get(key)) {
+        (Some(bound), None) => {
+            let uniform = bound.map(|bound| bound * bound / 3.0);
+            Covariance::from_diagonal(&uniform).map_err(|error| root.error(format!("'{key}': {error}")))
+        }
+        _ => noise(key, what, size),
+    };
     let zeros = |((rows, _), (columns, _)): Shape<'_>| DMatrix::zeros(rows, columns);
     let g = if inputs.is_empty() {
         optional("G", (n, k))?
@@ -85,17 +98,64 @@ pub(super) fn read(root: &Section<'_>) -> Result<(Frame, Linear), Error> {
         g: g.unwrap_or_else(|| zeros((n, k))),
         h: needed("H", "the output matrix", (m, n))?,
         d: optional("D", (m, k))?.unwrap_or_else(|| zeros((m, k))),
-        q: noise("Q", "the covariance of the process noise, added each sample", n)?,
-        r: noise("R", "the covariance of the measurement noise", m)?,
+        q: noise(
+            "Q",
+            "the covariance of the process noise, added each sample",
+            n,
+            bounds.as_ref().map(|bounds| &bounds.process),
+        )?,
+        r: noise(
+            "R",
+            "the covariance of the measurement noise",
+            m,
+            bounds.as_ref().map(|bounds| &bounds.measurement),
+        )?,
         s: optional("S", (n, m))?,
         x0,
-        p0: noise("P0", "the covariance of what is known of the state at the first row", n)?,
+        p0: noise(
+            "P0",
+            "the covariance of what is known of the state at the first row",
+            n,
+            bounds.as_ref().map(|bounds| &bounds.initial),
+        )?,
+        bounds,
     };
     let correlated = root.get("S");
     Linear::of_matrices(Names { states, inputs, outputs, sample_time }, matrices, None).map_err(|error| {
         let message = format!("no noises have these Q, R and S: {error}");
         correlated.as_ref().map_or_else(|| root.error(error.to_string()), |entry| entry.error(message))
     })
+}
+
+/// How large the noises are at most, if that is said: of all of them.
+fn bounds(root: &Section<'_>, states: usize, outputs: usize) -> Result<Option<Bounds>, Error> {
+    let keys = ["process_bound", "measurement_bound", "initial_bound"];
+    if keys.iter().all(|key| root.get(key).is_none()) {
+        return Ok(None);
+    }
+    let bound = |key: &str, what: &str, count: usize, of: &str| {
+        let entry = root.require(key, what)?;
+        let values = entry.numbers()?;
+        if values.len() != count {
+            return Err(
+                entry.error(format!("'{key}' has {} numbers, but there are {count} {of}", values.len()))
+            );
+        }
+        match values.iter().find(|value| **value < 0.0) {
+            Some(wrong) => Err(entry.value_error(format!("'{key}' has {wrong}: no magnitude is negative"))),
+            None => Ok(DVector::from_vec(values)),
+        }
+    };
+    Ok(Some(Bounds {
+        process: bound(
+            keys[0],
+            "the largest process noise of each state, as the others are there",
+            states,
+            "states",
+        )?,
+        measurement: bound(keys[1], "the largest measurement noise of each output", outputs, "outputs")?,
+        initial: bound(keys[2], "how far each state may be from x0 at the first row", states, "states")?,
+    }))
 }
 
 /// Names, none of them twice.

@@ -27,9 +27,13 @@ use crate::report::Report;
 /// R = [[15099.0]]
 /// x0 = [0]                  # zeros if left out
 /// P0 = [[1e7]]
+/// process_bound = [120]     # instead of, or beside, Q, R and P0: the largest magnitudes of w and v,
+/// measurement_bound = [400] # and of x - x0 at the first row, for Estimator::Bounded
+/// initial_bound = [1e4]
 /// ```
 ///
-/// and with G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x
+/// Where a covariance is left out beside its bound, it is that of noise that is uniform within it: bound²/3. There is also
+/// G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x
 /// outputs).
 #[derive(Debug, Clone)]
 pub struct StateModel {

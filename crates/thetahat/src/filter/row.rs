@@ -6,6 +6,7 @@ use thetahat_core::{Action, Error, Innovation};
 use thetahat_numerics::distribution::chi_square_interval;
 
 use super::estimate::{StateEstimate, StateValues};
+use super::estimator::Certainty;
 use super::kind::{Expected, Gaussian, Kind, Sample};
 use super::model::StateModel;
 
@@ -45,20 +46,32 @@ pub(super) struct Told {
     nis: Option<f64>,
     log_likelihood: Option<f64>,
     action: Action,
+    #[serde(default)]
+    contradiction: Option<usize>,
 }
 
 impl Told {
     pub(super) fn of(innovation: &Innovation<f64, DVector<f64>>) -> Self {
         let measured = innovation.action != Action::Missing;
         let log_likelihood = Some(innovation.log_likelihood());
-        Self { nis: measured.then_some(innovation.nis), log_likelihood, action: innovation.action }
+        Self {
+            nis: measured.then_some(innovation.nis),
+            log_likelihood,
+            action: innovation.action,
+            contradiction: None,
+        }
+    }
+
+    /// By a set, which knows no likelihood.
+    pub(super) fn of_set(action: Action, contradiction: Option<usize>) -> Self {
+        Self { nis: None, log_likelihood: None, action, contradiction }
     }
 
     /// By an observer, which knows no noise.
     pub(super) fn nothing(sample: &Sample) -> Self {
         let missing = sample.outputs.iter().all(|output| output.is_nan());
         let action = if missing { Action::Missing } else { Action::Updated };
-        Self { nis: None, log_likelihood: None, action }
+        Self { nis: None, log_likelihood: None, action, contradiction: None }
     }
 }
 
@@ -125,6 +138,22 @@ impl Row {
         }
     }
 
+    /// How far at most the predicted state is from its estimate.
+    pub(super) fn reaches(&mut self, reaches: &DVector<f64>) {
+        self.predicted_deviations.copy_from_slice(reaches.as_slice());
+    }
+
+    /// How large innovations are at most.
+    pub(super) fn output_reaches(&mut self, reaches: &DVector<f64>) {
+        self.output_deviations.copy_from_slice(reaches.as_slice());
+    }
+
+    /// The corrected state, and how far at most the state is from it.
+    pub(super) fn corrected(&mut self, state: &DVector<f64>, reaches: &DVector<f64>) {
+        self.filtered.copy_from_slice(state.as_slice());
+        self.filtered_deviations.copy_from_slice(reaches.as_slice());
+    }
+
     /// p(z), and |dp/dz| times the standard deviation of z.
     pub(super) fn parameters(&mut self, kind: &Kind) {
         let Kind::Grey(grey) = kind else { return };
@@ -186,27 +215,37 @@ impl Row {
         }
     }
 
-    /// `certain`: with standard deviations, and a filtered state.
-    pub(super) fn estimate(&self, row: usize, time: f64, certain: bool, told: &Told) -> StateEstimate<'_> {
-        fn values<'a>(values: &'a [f64], deviations: &'a [f64], certain: bool) -> StateValues<'a> {
-            StateValues { values, standard_deviations: certain.then_some(deviations) }
+    pub(super) fn estimate(
+        &self,
+        row: usize,
+        time: f64,
+        certainty: Certainty,
+        told: &Told,
+    ) -> StateEstimate<'_> {
+        fn values<'a>(values: &'a [f64], numbers: &'a [f64], certainty: Certainty) -> StateValues<'a> {
+            StateValues {
+                values,
+                standard_deviations: (certainty == Certainty::Deviations).then_some(numbers),
+                bounds: (certainty == Certainty::Bounds).then_some(numbers),
+            }
         }
         let states = self.states;
         let measured = self.innovations.iter().filter(|innovation| !innovation.is_nan()).count();
-        let filtered = values(&self.filtered[..states], &self.filtered_deviations[..states], true);
+        let filtered = values(&self.filtered[..states], &self.filtered_deviations[..states], certainty);
         let bounds = measured.checked_sub(1).and_then(|place| self.bounds.get(place).copied().flatten());
         StateEstimate {
             row,
             time,
-            predicted: values(&self.predicted[..states], &self.predicted_deviations[..states], certain),
-            filtered: certain.then_some(filtered),
-            parameters: values(&self.parameters, &self.parameter_deviations, certain),
-            outputs: values(&self.outputs, &self.output_deviations, certain),
+            predicted: values(&self.predicted[..states], &self.predicted_deviations[..states], certainty),
+            filtered: (certainty != Certainty::Nothing).then_some(filtered),
+            parameters: values(&self.parameters, &self.parameter_deviations, certainty),
+            outputs: values(&self.outputs, &self.output_deviations, certainty),
             innovations: &self.innovations,
             measured,
             nis: told.nis,
             nis_bounds: told.nis.and(bounds),
             log_likelihood: told.log_likelihood,
+            contradiction: told.contradiction,
             action: told.action,
             held: &self.held,
         }

@@ -32,7 +32,8 @@ impl SmoothedStates {
         let start = row.checked_sub(1)?.checked_mul(size)?;
         let (states, parameters) = self.values.get(start..start.checked_add(size)?)?.split_at(self.states);
         let (deviations, others) = self.deviations.get(start..start + size)?.split_at(self.states);
-        let values = |values, deviations| StateValues { values, standard_deviations: Some(deviations) };
+        let values =
+            |values, deviations| StateValues { values, standard_deviations: Some(deviations), bounds: None };
         (row <= self.rows()).then_some((values(states, deviations), values(parameters, others)))
     }
 }
@@ -64,11 +65,12 @@ impl StateFilter {
     /// # Ok::<(), thetahat::Error>(())
     /// ```
     pub fn smooth(&self) -> Result<SmoothedStates, Error> {
-        if self.is_observer() {
-            return Err(Error::argument(
-                "estimator",
-                "an observer knows no noises, so it does not smooth: use a Kalman filter",
-            ));
+        if !self.is_gaussian() {
+            let reason = match self.engine {
+                Engine::Bounded(_) => "a set for bounded noise has no covariance, so it does not smooth",
+                _ => "an observer knows no noises, so it does not smooth",
+            };
+            return Err(Error::argument("estimator", format!("{reason}: use a Kalman filter")));
         }
         let Some(history) = self.history().filter(|history| history.len() == self.totals().rows) else {
             return Err(Error::argument("recording", "the rows were not recorded from the first one on"));
@@ -87,7 +89,7 @@ impl StateFilter {
                 smoothed(kind, Smoother::new(iterated), history, Smoother::smooth)
             }
             // Refused above.
-            Engine::Observer { .. } => Ok(Vec::new()),
+            Engine::Bounded(_) | Engine::Observer { .. } => Ok(Vec::new()),
         };
         let smoothed = smoothed.map_err(overflow)?;
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::nalgebra::DVector;
 
 use super::StateFilter;
+use super::bounded::StateSet;
 use super::estimator::Engine;
 use super::kind::{Filter, Observer, Sample, Unscented};
 use super::past::Past;
@@ -33,6 +34,7 @@ pub struct FilterSnapshot {
 enum EngineSnapshot {
     Filter(Filter),
     Unscented(Unscented),
+    Bounded(StateSet),
     Observer(Observer),
 }
 
@@ -65,6 +67,7 @@ impl StateFilter {
             engine: match &self.engine {
                 Engine::Filter(filter) => EngineSnapshot::Filter(filter.clone()),
                 Engine::Unscented(filter) => EngineSnapshot::Unscented(filter.clone()),
+                Engine::Bounded(bounded) => EngineSnapshot::Bounded(bounded.set.clone()),
                 Engine::Observer { observer, .. } => EngineSnapshot::Observer(observer.clone()),
             },
             previous: self.previous.as_ref().map(|Sample { time, inputs, outputs }| SampleSnapshot {
@@ -96,6 +99,9 @@ impl StateFilter {
         let fits = match (&engine, &self.engine) {
             (EngineSnapshot::Filter(filter), Engine::Filter(_)) => filter.state().len() == states,
             (EngineSnapshot::Unscented(filter), Engine::Unscented(_)) => filter.state().len() == states,
+            (EngineSnapshot::Bounded(set), Engine::Bounded(bounded)) => {
+                set.centre().len() == states && set.capacity() == bounded.set.capacity()
+            }
             (EngineSnapshot::Observer(observer), Engine::Observer { .. }) => {
                 observer.state().len() == states && observer.gain().ncols() == outputs
             }
@@ -114,6 +120,7 @@ impl StateFilter {
         match (engine, &mut self.engine) {
             (EngineSnapshot::Filter(kept), Engine::Filter(filter)) => *filter = kept,
             (EngineSnapshot::Unscented(kept), Engine::Unscented(filter)) => *filter = kept,
+            (EngineSnapshot::Bounded(kept), Engine::Bounded(bounded)) => bounded.set = kept,
             (EngineSnapshot::Observer(kept), Engine::Observer { observer, .. }) => *observer = kept,
             // Seen above.
             _ => {}

@@ -1,8 +1,8 @@
 use thetahat_core::nalgebra::DVector;
 
 use super::estimate::StateEstimate;
-use super::estimator::{Engine, Estimator};
-use super::kind::{Division, Gaussian, Kind, Sample};
+use super::estimator::{Certainty, Engine, Estimator};
+use super::kind::{Division, Gaussian, Kind, Motion, Sample};
 use super::linearization::Work;
 use super::model::StateModel;
 use super::past::Past;
@@ -126,7 +126,7 @@ impl StateFilter {
     /// What it knows after the latest row; none before the first.
     pub fn latest(&self) -> Option<StateEstimate<'_>> {
         let time = self.previous.as_ref()?.time;
-        Some(self.row.estimate(self.totals.rows, time, !self.is_observer(), self.told.as_ref()?))
+        Some(self.row.estimate(self.totals.rows, time, self.engine.certainty(), self.told.as_ref()?))
     }
 
     /// The word for the estimator that was asked for.
@@ -134,9 +134,9 @@ impl StateFilter {
         self.estimator
     }
 
-    /// Whether it knows no noises.
-    pub(super) fn is_observer(&self) -> bool {
-        matches!(self.engine, Engine::Observer { .. })
+    /// Whether it knows the likelihood of a row.
+    pub(super) fn is_gaussian(&self) -> bool {
+        self.engine.certainty() == Certainty::Deviations
     }
 
     /// The rows that it remembers, with the step before each.
@@ -204,6 +204,13 @@ impl StateFilter {
             Engine::Unscented(filter) => {
                 filtered(kind, filter, from, &sample, next, (&past, work)).map_err(refused)?
             }
+            Engine::Bounded(bounded) => match kind {
+                Kind::Sampled(frame, Motion::Linear(linear)) => {
+                    bounded.take((frame, linear), from, &sample, next).map_err(refused)?
+                }
+                // Refused when it was made.
+                _ => Told::nothing(&sample),
+            },
             Engine::Observer { observer, poles } => {
                 if let Some((previous, division)) = from {
                     kind.observe(observer, poles.as_ref(), previous, &sample, division, (&past, work))
@@ -226,8 +233,7 @@ impl StateFilter {
         }
         self.previous = Some(sample);
         let told = self.told.insert(told);
-        let certain = !matches!(self.engine, Engine::Observer { .. });
-        let estimate = self.row.estimate(row, time, certain, told);
+        let estimate = self.row.estimate(row, time, self.engine.certainty(), told);
         self.totals.add(&estimate);
         Ok(estimate)
     }

@@ -3,6 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
 use super::estimate::StateValues;
+use super::estimator::Certainty;
 use crate::Document;
 use crate::document::document_methods;
 use crate::respond::NisSummary;
@@ -14,16 +15,19 @@ pub struct FilterSummary {
     pub schema: String,
     /// The program and version that wrote it.
     pub generator: String,
-    /// `kalman`, `ekf`, `iekf`, `ukf` or `luenberger`, as it was asked for.
+    /// `kalman`, `ekf`, `iekf`, `ukf`, `bounded` or `luenberger`, as it was asked for.
     pub estimator: String,
     /// The rows.
     pub rows: usize,
     /// The elements of measurements that were there.
     pub measured: usize,
-    /// The log-likelihood of all of them; none from an observer.
+    /// The log-likelihood of all of them; none from an observer, and where noise is bounded.
     pub log_likelihood: Option<f64>,
     /// The normalised innovation squared, counted by row; none where nothing was measured, and from an observer.
     pub nis: Option<NisSummary>,
+    /// The rows that no state within the bounds of noise explains, where these are what is known of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contradictions: Option<usize>,
     /// The states given all rows; from an observer as predicted for the last row.
     pub states: Vec<EstimatedNumber>,
     /// The unknown parameters given all rows.
@@ -37,8 +41,11 @@ pub struct EstimatedNumber {
     pub name: String,
     /// The estimate.
     pub value: f64,
-    /// Its standard deviation; none from an observer.
+    /// Its standard deviation; none from an observer, and where noise is bounded.
     pub standard_deviation: Option<f64>,
+    /// How far at most it is from the estimate, where noise is bounded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bound: Option<f64>,
     /// How a parameter is kept within its bounds, such as `mass = 0.1 + exp(z)`; none for one without, and for a state.
     pub change_of_variable: Option<String>,
 }
@@ -55,8 +62,9 @@ impl StateFilter {
             estimator: self.estimator().to_owned(),
             rows: totals.rows,
             measured: totals.measured,
-            log_likelihood: (!self.is_observer()).then_some(totals.log_likelihood),
+            log_likelihood: self.is_gaussian().then_some(totals.log_likelihood),
             nis: totals.nis.summary(),
+            contradictions: (self.engine.certainty() == Certainty::Bounds).then_some(totals.contradictions),
             states: estimated(model.states().iter().map(String::as_str), states, std::iter::repeat(None)),
             parameters: estimated(
                 model.unknown(),
@@ -73,13 +81,14 @@ fn estimated<'a>(
     values: Option<StateValues<'_>>,
     changes: impl Iterator<Item = Option<String>>,
 ) -> Vec<EstimatedNumber> {
-    let Some(StateValues { values, standard_deviations }) = values else { return Vec::new() };
+    let Some(StateValues { values, standard_deviations, bounds }) = values else { return Vec::new() };
     let named = names.zip(values).zip(changes).enumerate();
     named
         .map(|(index, ((name, &value), change_of_variable))| EstimatedNumber {
             name: name.to_owned(),
             value,
             standard_deviation: standard_deviations.and_then(|deviations| deviations.get(index)).copied(),
+            bound: bounds.and_then(|bounds| bounds.get(index)).copied(),
             change_of_variable,
         })
         .collect()

@@ -1,3 +1,4 @@
+mod bounded;
 mod equations;
 mod lags;
 mod observers;

@@ -16,11 +16,18 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
         "ekf" => "extended Kalman filter",
         "iekf" => "iterated extended Kalman filter",
         "ukf" => "unscented Kalman filter",
+        "bounded" => "set for bounded noise",
         _ => "Luenberger observer",
     };
     on.line(format!("{estimator}: {} rows{faults}, {} values measured", summary.rows, summary.measured));
     if let Some(sum) = summary.log_likelihood {
         on.line(format!("log-likelihood {}", number(sum)));
+    }
+    match summary.contradictions {
+        None => {}
+        Some(0) => on.line("every row is explained by a state within the bounds".to_owned()),
+        Some(1) => on.line("1 row that no state within the bounds explains".to_owned()),
+        Some(count) => on.line(format!("{count} rows that no state within the bounds explains")),
     }
     if let Some(nis) = &summary.nis {
         on.line(consistency(nis));
@@ -36,7 +43,9 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
 
 fn table(on: &mut Sections, title: &str, estimates: &[EstimatedNumber]) {
     let bounded = estimates.iter().any(|estimate| estimate.change_of_variable.is_some());
-    let mut table = columns("Estimates", [title, "value", "standard deviation", "estimated as"])
+    let is_set = estimates.iter().any(|estimate| estimate.bound.is_some());
+    let certainty = if is_set { "at most" } else { "standard deviation" };
+    let mut table = columns("Estimates", [title, "value", certainty, "estimated as"])
         .words(&[3])
         .none("an observer knows no standard deviations")
         .without(if bounded { &[] } else { &[3] });
@@ -44,7 +53,7 @@ fn table(on: &mut Sections, title: &str, estimates: &[EstimatedNumber]) {
         table.row([
             word(&estimate.name),
             figure(estimate.value, number),
-            error(estimate.standard_deviation),
+            error(estimate.standard_deviation.or(estimate.bound)),
             word(estimate.change_of_variable.clone().unwrap_or_default()),
         ]);
     }

@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 class StateEstimate(NamedTuple):
     """What a filter knows after a row.
 
-    Standard deviations, and what follows from them, are NaN of an observer, which knows no noise.
+    Standard deviations, and what follows from them, are NaN of an observer, which knows no noise, and where noise is bounded.
     """
 
     row: int
@@ -60,6 +60,14 @@ class StateEstimate(NamedTuple):
     """Between which it lies in 95 % of the rows if the model is right, shape (2,)."""
     log_likelihood: float
     """The log-likelihood of this row given those before: 0 if nothing was measured."""
+    predicted_bounds: Array
+    """How far at most the state is from ``predicted``, where noise is bounded; else NaN."""
+    filtered_bounds: Array
+    """How far at most the state is from ``filtered``, where noise is bounded; else NaN."""
+    output_bounds: Array
+    """How large the innovations are at most, where noise is bounded; else NaN."""
+    contradiction: int
+    """The output that no state within the bounds explains, so that the row was not used; -1 if there is none."""
     action: str
     """What was done with the measurement, see `Innovation`."""
     held: npt.NDArray[np.bool_]
@@ -69,7 +77,7 @@ class StateEstimate(NamedTuple):
 class StateTrajectory:
     """What a `StateFilter` knew in a run, row by row.
 
-    Standard deviations, and what follows from them, are NaN of an observer, which knows no noise.
+    Standard deviations, and what follows from them, are NaN of an observer, which knows no noise, and where noise is bounded.
 
     Attributes
     ----------
@@ -93,6 +101,12 @@ class StateTrajectory:
         Between which they lie in 95 % of the rows if the model is right.
     log_likelihoods : ndarray, shape (N,)
         The log-likelihood of each row given those before; `log_likelihood` is their sum.
+    predicted_bounds, filtered_bounds : ndarray, shape (N, n)
+        How far at most the state is from the estimate, where noise is bounded; else NaN.
+    output_bounds : ndarray, shape (N, m)
+        How large the innovations are at most, where noise is bounded; else NaN.
+    contradictions : ndarray, shape (N,)
+        The output that no state within the bounds explains, so that the row was not used; -1 where there is none.
     actions : ndarray of str, shape (N,)
         What was done with each row, see `Innovation`.
     held : ndarray of bool, shape (N, k)
@@ -117,6 +131,10 @@ class StateTrajectory:
     nis: Array
     nis_bounds: Array
     log_likelihoods: Array
+    predicted_bounds: Array
+    filtered_bounds: Array
+    output_bounds: Array
+    contradictions: Array
     actions: npt.NDArray[np.str_]
     held: npt.NDArray[np.bool_]
     smoothed: Array | None = None
@@ -135,6 +153,7 @@ class StateTrajectory:
         self.output_names = filter.outputs
         self._clock = rows.clock
         self._observes = filter.estimator == "luenberger"
+        self._bounded = filter.estimator == "bounded"
 
     @property
     def log_likelihood(self) -> float:
@@ -165,6 +184,9 @@ class StateTrajectory:
 
     def _columns(self) -> dict[str, Any]:
         columns: dict[str, Any] = {"action": self.actions}
+        if self._bounded:
+            places = self.contradictions.astype(int)
+            columns["contradicts"] = np.array([self.output_names[place] if place >= 0 else "" for place in places], dtype=np.str_)
 
         def pair(name: str, values: Array | None, deviations: Array | None, place: int) -> None:
             if values is not None and deviations is not None:
@@ -172,7 +194,16 @@ class StateTrajectory:
                 if not self._observes:
                     columns[f"{name}_sd"] = deviations[:, place]
 
+        def interval(name: str, values: Array, bounds: Array, place: int) -> None:
+            columns[name] = values[:, place]
+            columns[f"{name}_low"] = values[:, place] - bounds[:, place]
+            columns[f"{name}_high"] = values[:, place] + bounds[:, place]
+
         for place, name in enumerate(self.state_names):
+            if self._bounded:
+                interval(name, self.filtered, self.filtered_bounds, place)
+                interval(f"{name}_predicted", self.predicted, self.predicted_bounds, place)
+                continue
             if not self._observes:
                 pair(name, self.filtered, self.filtered_deviations, place)
             pair(f"{name}_predicted", self.predicted, self.predicted_deviations, place)
@@ -183,8 +214,12 @@ class StateTrajectory:
         for place, name in enumerate(self.output_names):
             columns[f"measured_{name}"] = self.measured[:, place]
             columns[f"predicted_{name}"] = self.outputs[:, place]
+            if self._bounded:
+                columns[f"innovation_{name}"] = self.innovations[:, place]
+                columns[f"innovation_{name}_bound"] = self.output_bounds[:, place]
+                continue
             pair(f"innovation_{name}", self.innovations, self.output_deviations, place)
-        if not self._observes:
+        if not self._observes and not self._bounded:
             columns |= {"nis": self.nis, "nis_low": self.nis_bounds[:, 0], "nis_high": self.nis_bounds[:, 1]}
             columns["log_likelihood"] = self.log_likelihoods
         if self.input_names:
@@ -222,16 +257,19 @@ class StateFilter:
     model : Model, StateModel or GreyBox
         The model: of a fit, in innovations form, with its offsets, or where it is a nonlinear ARX model with its lags as the state, as
         deviations from the offsets; or in matrices or equations.
-    estimator : {"kalman", "ekf", "iekf", "ukf", "luenberger"}, optional
+    estimator : {"kalman", "ekf", "iekf", "ukf", "bounded", "luenberger"}, optional
         How to estimate: "kalman" for a linear model, else "ekf", the extended Kalman filter, which estimates unknown parameters
         with the state. "iekf" iterates its corrections, for accurate measurements of what bends; "ukf" is the unscented
-        filter, whose deviations know how the model bends. "luenberger" is an observer, with ``poles`` or ``gain``.
+        filter, whose deviations know how the model bends. "bounded" keeps a set in which the state is for certain while noises
+        keep their bounds, for linear models in matrices or of a fit. "luenberger" is an observer, with ``poles`` or ``gain``.
     initial : {"unknown", "zero"}, optional
         The initial state of a `Model`: unknown, so that it is estimated from the first rows, which is the default; or at rest, with its
         channels at their offsets. Equations and matrices have an initial state of their own.
     measurement_noise : float, or array_like of shape (m,), optional
         Standard deviation of white noise in what is measured, in units of each output, beside the noise of the `Model`, which drives
         the plant: for nonlinear ARX models, 0 unless it is said. The others say theirs.
+    deviations : float, optional
+        For "bounded": so many standard deviations of its noises bound those of a model that says no bounds.
     poles : array_like of complex, shape (n,), optional
         Where the error of the observer is to have its poles in the z plane.
     gain : array_like, shape (n, m), optional
@@ -256,7 +294,8 @@ class StateFilter:
     References
     ----------
     Anderson and Moore, Optimal Filtering, 1979. Luenberger, An introduction to observers, 1971. Bell and Cathey, The iterated
-    Kalman filter update as a Gauss-Newton method, 1993. Julier and Uhlmann, Unscented filtering and nonlinear estimation, 2004.
+    Kalman filter update as a Gauss-Newton method, 1993. Julier and Uhlmann, Unscented filtering and nonlinear estimation, 2004. Alamo,
+    Bravo and Camacho, Guaranteed state estimation by zonotopes, 2005.
 
     Examples
     --------
@@ -268,18 +307,27 @@ class StateFilter:
     (300, 2)
     >>> filter.update(log.y[-1], log.u[-1]).action
     'updated'
+
+    Noise of which the bound alone is known: the level is in its interval for certain, and the last row cannot be.
+
+    >>> text = "sample_time = 1\\noutputs = ['y']\\nstates = ['level']\\nF = [[1]]\\nH = [[1]]\\n"
+    >>> text += "process_bound = [0.1]\\nmeasurement_bound = [1]\\ninitial_bound = [100]\\n"
+    >>> level = th.StateFilter(th.StateModel.from_toml(text), "bounded").run([3.0, 4.0, 3.5, 9.0])
+    >>> level.to_pandas()[["contradicts", "level", "level_low", "level_high"]].round(2).values.tolist()[2:]
+    [['', 3.55, 2.9, 4.2], ['y', 3.55, 2.8, 4.3]]
     """
 
-    __slots__ = ("_filter", "_gain", "_initial", "_last", "_model", "_noise", "_poles", "_seen", "estimator")
+    __slots__ = ("_deviations", "_filter", "_gain", "_initial", "_last", "_model", "_noise", "_poles", "_seen", "estimator")
     estimator: str
 
     def __init__(
         self,
         model: Model | StateModel | GreyBox,
-        estimator: Literal["kalman", "ekf", "iekf", "ukf", "luenberger"] | None = None,
+        estimator: Literal["kalman", "ekf", "iekf", "ukf", "bounded", "luenberger"] | None = None,
         *,
         initial: Initial | None = None,
         measurement_noise: npt.ArrayLike | None = None,
+        deviations: float | None = None,
         poles: npt.ArrayLike | None = None,
         gain: npt.ArrayLike | None = None,
     ) -> None:
@@ -300,7 +348,8 @@ class StateFilter:
         self._poles = None if poles is None else _poles(poles)
         self._gain = gain if gain is None else _numbers.array("gain", gain).copy()
         split = None if self._poles is None else (self._poles.real.tolist(), self._poles.imag.tolist())
-        self._filter = _thetahat.StateFilter(seen, estimator, split, self._gain)
+        self._deviations = None if deviations is None else float(_options.number("deviations", deviations))
+        self._filter = _thetahat.StateFilter(seen, estimator, self._deviations, split, self._gain)
         self._model, self._initial, self._noise, self._seen = model, initial, measurement_noise, seen
         self.estimator = ("kalman" if seen.is_linear else "ekf") if estimator is None else estimator
         self._last: _rows.Last | None = None
@@ -514,7 +563,7 @@ class StateFilter:
         _thetahat.write(_files.name(path), self.to_json())
 
     def __reduce__(self) -> tuple[Any, ...]:
-        given = (self._model, self.estimator, self._initial, self._noise, self._poles, self._gain)
+        given = (self._model, self.estimator, self._initial, self._noise, self._deviations, self._poles, self._gain)
         return (_restored, (given, self._filter.snapshot(), self._last))
 
     def __repr__(self) -> str:
@@ -527,8 +576,10 @@ class StateFilter:
 
 def _restored(given: tuple[Any, ...], snapshot: str, last: _rows.Last | None) -> StateFilter:
     """Makes a filter again of what `__reduce__` gave."""
-    model, estimator, initial, noise, poles, gain = given
-    made = StateFilter(model, estimator, initial=initial, measurement_noise=noise, poles=poles, gain=gain)
+    model, estimator, initial, noise, deviations, poles, gain = given
+    made = StateFilter(
+        model, estimator, initial=initial, measurement_noise=noise, deviations=deviations, poles=poles, gain=gain
+    )
     made._filter.resume(snapshot)
     made._last = last
     return made

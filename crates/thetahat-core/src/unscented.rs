@@ -10,6 +10,9 @@ use crate::triangle::{column, column_mut};
 use crate::ud::{self, add_multiple};
 use crate::{Covariance, Dimension, Error, Innovation, KalmanFilter, Observation, Real, Transition};
 
+/// A mean and a covariance.
+type Moments<T, N> = (OVector<T, N>, Covariance<T, N>);
+
 /// The unscented Kalman filter.
 ///
 /// It keeps an estimate x̂ of the state and a covariance P = U D U' of its error, as [`KalmanFilter`] does, for models
@@ -189,7 +192,7 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         &self,
         observation: &impl Observation<T, N, M, U>,
         input: &OVector<T, U>,
-    ) -> Result<(OVector<T, M>, Covariance<T, M>), Error>
+    ) -> Result<Moments<T, M>, Error>
     where
         N: Dimension<M>,
     {

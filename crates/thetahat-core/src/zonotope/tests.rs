@@ -40,7 +40,7 @@ fn long_run<T: Real>(steps: usize, extreme: bool) -> (f64, Vector3<f64>, Vector3
     let mut noise = Noise(17);
     // Uniform, or always at a bound.
     let mut draw = |bound: f64| bound * if extreme { noise.next().signum() } else { noise.next() };
-    let mut truth = start.map(|reach| draw(reach));
+    let mut truth = start.map(&mut draw);
     let (mut worst, mut reach, mut interval) = (0.0_f64, Vector3::zeros(), Vector3::zeros());
     for step in 0..steps {
         truth = exact.next(&truth, &SVector::zeros()) + W.map(&mut draw);

@@ -37,8 +37,14 @@ fn fit(model: &GreyBox, log: &Log) -> Report {
     fit_equations(model, log, &[], &EquationsPlan::default(), &|_| ControlFlow::Continue(())).expect("a fit")
 }
 
+/// By name: a value, and what else is known of it.
+type Figures = BTreeMap<String, (f64, f64, Option<f64>)>;
+
+/// What gravity takes at an angle.
+type Gravity = fn(f64) -> f64;
+
 /// What was found, with its standard errors and where the search started: parameters and figures.
-fn found(report: &Report) -> (BTreeMap<String, (f64, f64, Option<f64>)>, &EquationsModel) {
+fn found(report: &Report) -> (Figures, &EquationsModel) {
     let Model::Equations(model) = &report.model else { panic!("no equations") };
     let outcome = report.estimation.procedure.equations().expect("equations");
     let parameters = model.parameters.iter().zip(&outcome.unknown).map(|(parameter, unknown)| {
@@ -113,7 +119,7 @@ fn mechanisms_are_recovered() {
 fn the_reference_of_wpilib_is_met_without_noise() {
     const STEP: f64 = 0.005;
     const PARTS: usize = 50;
-    let gravities: [(&str, &str, fn(f64) -> f64); 3] = [
+    let gravities: [(&str, &str, Gravity); 3] = [
         ("mechanism", "position", |_| 0.0),
         ("elevator", "position", |_| -0.211),
         ("arm", "angle", |angle| -0.211 * angle.cos()),

@@ -103,8 +103,8 @@ fn factored<S: Number<f64>>(mut matrix: Vec<S>, n: usize) -> (Vec<S>, Vec<S>) {
     for column in (0..n).rev() {
         factor[column * n + column] = 1.0.into();
         let pivot = matrix[column * n + column];
-        // Not for NaN either.
-        if !(pivot.value() > 4.0 * f64::EPSILON * n as f64 * sizes[column]) {
+        let is_more_than_rounding = pivot.value() > 4.0 * f64::EPSILON * n as f64 * sizes[column];
+        if !is_more_than_rounding {
             continue;
         }
         variances[column] = pivot;

@@ -223,7 +223,7 @@ impl Problem<'_> {
         let (mut rows, mut targets) = (Vec::new(), Vec::new());
         for (run, charges) in self.task.runs.iter().zip(self.charges) {
             let mut lags = vec![0.0; taus.len()];
-            for row in 0..run.time.len() {
+            for (row, charge) in charges.iter().enumerate() {
                 let current = self.sign * run.values[CURRENT][row];
                 if row > 0 {
                     let dt = run.time[row] - run.time[row - 1];
@@ -239,7 +239,7 @@ impl Problem<'_> {
                 if row % stride != 0 && !steps {
                     continue;
                 }
-                let soc = self.first + charges[row] / self.capacity;
+                let soc = self.first + charge / self.capacity;
                 let start = rows.len();
                 rows.resize(start + width, 0.0);
                 hats(knots, soc, &mut rows[start..start + knots.len()]);

@@ -105,7 +105,7 @@ pub(super) fn solve(rows: Vec<f64>, targets: Vec<f64>, width: usize) -> Option<V
     let right = decomposed.q().tr_mul(&target);
     let triangle = decomposed.r().svd(true, true);
     let singular = &triangle.singular_values;
-    if !(singular.min() > 1e-9 * singular.max()) {
+    if singular.iter().any(|value| value.is_nan()) || singular.min() <= 1e-9 * singular.max() {
         return None;
     }
     let solution = triangle.solve(&right, 0.0).ok()?;

@@ -146,5 +146,5 @@ pub(super) fn fitted_with(model: &GreyBox, logs: &[Recording], plan: &EquationsP
     let Procedure::InnovationsLikelihood(outcome) = report.estimation.procedure.clone() else {
         panic!("other procedure")
     };
-    Ok(Found { report, model, outcome })
+    Ok(Found { report, model: *model, outcome })
 }

@@ -6,7 +6,7 @@
 //! model: its text can be written out and changed.
 //!
 //! **Start values.** The equations are linear in the parameters, or in combinations of them, if the states are
-//! measured: least squares on modulated signals finds them for windows of several lengths ([`modulated`]), or a grid of
+//! measured: least squares on modulated signals finds them for windows of several lengths, or a grid of
 //! time constants with least squares for the rest. Each candidate goes through the filter once; the one of the largest
 //! likelihood is where the fit starts. All of that is deterministic.
 //!

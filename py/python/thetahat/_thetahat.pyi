@@ -72,6 +72,8 @@ __all__ = [
     "sine_test",
     "spectrum",
     "step_test",
+    "template",
+    "templates",
     "threads",
     "topics",
     "tune",

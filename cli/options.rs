@@ -21,11 +21,12 @@ const TABLES: [&[OptionRow]; 6] = [
 ];
 
 /// The arguments of the libraries that are options, by the name that both have, beside those in a table.
-pub(crate) const OPTIONS: [&str; 37] = [
+pub(crate) const OPTIONS: [&str; 38] = [
     "cancel-zeros",
     "comment",
     "decimal-comma",
     "delimiter",
+    "deviations",
     "draws",
     "encoding",
     "for",

@@ -21,12 +21,13 @@ const TABLES: [&[OptionRow]; 6] = [
 ];
 
 /// The arguments of the libraries that are options, by the name that both have, beside those in a table.
-pub(crate) const OPTIONS: [&str; 39] = [
+pub(crate) const OPTIONS: [&str; 40] = [
     "cancel-zeros",
     "columns",
     "comment",
     "decimal-comma",
     "delimiter",
+    "deviations",
     "draws",
     "encoding",
     "for",

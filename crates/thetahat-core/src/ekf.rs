@@ -123,8 +123,8 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
     /// ```
     ///
     /// These are Gauss-Newton steps towards the most probable state, the minimum of V. t is the first of 1, 1/2, 1/4 …
-    /// that makes V smaller: whole steps may go to and fro, or away, where h bends within the uncertainty of x̂. It ends
-    /// when no step does, or the step is rounding. P is that of the last linearisation.
+    /// that makes V smaller: whole steps may go to and fro, or away, where h bends within the uncertainty of x̂. The
+    /// update ends when no step does, or the step is rounding. P is that of the last linearisation.
     ///
     /// Iterations help where the measurement is much more accurate than the prediction and h bends between the two; two
     /// or three are enough then. The innovation that is returned, and the gate, are those of the first.
@@ -139,8 +139,8 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         Ok(self)
     }
 
-    /// Sets how often a measurement update linearises at most: see [`with_iterations`](ExtendedKalmanFilter::with_iterations),
-    /// whose errors it has.
+    /// Sets how often a measurement update linearises at most: see
+    /// [`with_iterations`](ExtendedKalmanFilter::with_iterations), whose errors it has.
     pub fn set_iterations(&mut self, count: usize) -> Result<(), Error> {
         if count == 0 {
             return Err(Error::OutOfRange { argument: "iterations", range: "1 or more" });
@@ -241,6 +241,24 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
                 .linear
                 .absorb(first.rows, first.error, &first.noise, |h, v, s, e| record(0, h, v, s, e));
         }
+        self.iterate(first, observation, input, measurement, record)
+    }
+
+    /// An iterated measurement update, from the linearisation about the prediction. (Apart from the other, so that this
+    /// one costs no step that does not iterate.)
+    #[cold]
+    #[inline(never)]
+    fn iterate<M: Dimension + Dimension<N>, U: Dimension>(
+        &mut self,
+        first: Linearised<T, N, M>,
+        observation: &impl Observation<T, N, M, U>,
+        input: &OVector<T, U>,
+        measurement: &OVector<T, M>,
+        mut record: impl FnMut(usize, &[T], &[T], T, T),
+    ) -> Result<Innovation<T, OVector<T, M>>, Error>
+    where
+        N: Dimension<M>,
+    {
         let mut corrected = self.linear.clone();
         let Linearised { rows, error, noise } = first.clone();
         let innovation = corrected.absorb(rows, error, &noise, |h, v, s, e| record(0, h, v, s, e))?;

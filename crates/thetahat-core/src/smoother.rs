@@ -29,8 +29,8 @@ use crate::{
 /// with no larger variances than needed.
 ///
 /// It is stepped as the filter is, with models that may vary in time, several sensors, missing elements, and a gate.
-/// Around an [`ExtendedKalmanFilter`] it smooths with the linearisations that the filter made, and is as good as
-/// these; with linear models the result is exact. Around an [`UnscentedKalmanFilter`] it is the unscented smoother: that
+/// Around an [`ExtendedKalmanFilter`] it smooths with the linearisations that the filter made, and is as good as these;
+/// with linear models the result is exact. Around an [`UnscentedKalmanFilter`] it is the unscented smoother: that
 /// filter's F is cov(x(k), x(k+1))'P⁻¹, so that P F' is the cross covariance by which Särkkä (2008) goes back.
 ///
 /// Units: those of the model. Memory: 2 n² + n numbers for each sample, and 2 n + 2 for each element measured.
@@ -143,7 +143,8 @@ impl<T: Real, N: Dimension, F: Linearising<T, N>> Smoother<T, N, F> {
         &self.filter
     }
 
-    /// The time update: see [`ExtendedKalmanFilter::predict`] or [`UnscentedKalmanFilter::predict`]. A new sample begins.
+    /// The time update: see [`ExtendedKalmanFilter::predict`] or [`UnscentedKalmanFilter::predict`]. A new sample
+    /// begins.
     ///
     /// Errors, after which nothing has changed: as there.
     pub fn predict<U: Dimension>(

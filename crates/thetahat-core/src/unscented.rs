@@ -129,8 +129,8 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         Ok(KalmanFilter::new(state, covariance)?.into())
     }
 
-    /// The same with points at c standard deviations, √3 at first. Smaller: for functions that are not defined far away,
-    /// or bend otherwise there. With 1 the covariance knows nothing of bends.
+    /// The same with points at c standard deviations, √3 at first. Smaller: for functions that are not defined far
+    /// away, or bend otherwise there. With 1 the covariance knows nothing of bends.
     ///
     /// Errors: [`Error::OutOfRange`] if c is not in 1 … 10.
     pub fn with_spread(mut self, spread: T) -> Result<Self, Error> {

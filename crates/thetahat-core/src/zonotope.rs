@@ -23,20 +23,21 @@ use crate::{Action, Dimension, Error, LinearObservation, LinearTransition, Real,
 /// ```
 ///
 /// The result holds the intersection of set and strip, for any l. Here l_i is the one for which the interval of state i
-/// is shortest: it minimises Σ |g_ij - l_i s_j| + q |l_i|, and is the median of the ratios g_ij/s_j, weighted by |s_j|, and
-/// of 0, weighted by q. With one state this is the intersection of two intervals. (The usual gain, for which the sum of
-/// squares of all g_ij is least, left intervals two to four times as long in the tests, where the noise takes its
-/// extremes.) Where [a, b] is empty no state explains the measurement: a noise has left its bound, a sensor has failed, or
-/// the model is wrong. [`SetInnovation::contradiction`] tells it, with the output. The measurement is not used then, and
-/// the set stays as it is predicted; it grows with the bounds of w until measurements meet it again, if ever.
+/// is shortest: it minimises Σ |g_ij - l_i s_j| + q |l_i|, and is the median of the ratios g_ij/s_j, weighted by |s_j|,
+/// and of 0, weighted by q. With one state this is the intersection of two intervals. (The usual gain, for which the
+/// sum of squares of all g_ij is least, left intervals two to four times as long in the tests, where the noise takes
+/// its extremes.) Where [a, b] is empty no state explains the measurement: a noise has left its bound, a sensor has
+/// failed, or the model is wrong. [`SetInnovation::contradiction`] tells it, with the output. The measurement is not
+/// used then, and the set stays as it is predicted; it grows with the bounds of w until measurements meet it again, if
+/// ever.
 ///
 /// A zonotope has at most `G` generators. Where there would be more, those that are nearest to an axis, in units of the
-/// interval of each state, give way to one for each axis that holds their sum. Rounding is added to the bounds of w: so single
-/// precision keeps the promise too.
+/// interval of each state, give way to one for each axis that holds their sum. Rounding is added to the bounds of w: so
+/// single precision keeps the promise too.
 ///
 /// Beside a Kalman filter: no distribution is assumed, errors need not be independent in time, and the promise is for
-/// every sample, not for 95 % of them. The price is a wider interval where noise is Gaussian after all, since a bound must
-/// hold its extremes.
+/// every sample, not for 95 % of them. The price is a wider interval where noise is Gaussian after all, since a bound
+/// must hold its extremes.
 ///
 /// N is the number of states, n. `G` holds the generators: at least 2 n + 1; 10 n is plenty. Units: those of the model.
 /// Memory: n (G + 1) numbers.
@@ -351,8 +352,8 @@ impl<T: Real, N: Dimension + Dimension<G>, G: Dimension> ZonotopeFilter<T, N, G>
     }
 }
 
-/// The median of these ratios with the magnitudes of `weights`, and of 0 with the weight `at_zero`. Ratios whose weight is
-/// 0 do not count. Each pass over them leaves out those on one side of one of them.
+/// The median of these ratios with the magnitudes of `weights`, and of 0 with the weight `at_zero`. Ratios whose weight
+/// is 0 do not count. Each pass over them leaves out those on one side of one of them.
 fn weighted_median<T: Real>(ratios: &[T], weights: &[T], at_zero: T) -> T {
     let all = || {
         let each = ratios.iter().copied().zip(weights.iter().map(|weight| weight.abs()));

@@ -2,8 +2,9 @@
 //!
 //! - [`StateModel`] is a model with states: of a report, of matrices, or in equations, of which parameters may be
 //!   unknown. It begins in an [`InitialState`].
-//! - [`StateFilter`] estimates the state by an [`Estimator`]: a Kalman filter, an extended or unscented one, a set
-//!   for noise that is bounded, or a Luenberger observer with an [`ObserverGain`]. Each row gives a [`StateEstimate`] with [`StateValues`].
+//! - [`StateFilter`] estimates the state by an [`Estimator`]: a Kalman filter, an extended or unscented one, a set for
+//!   noise that is bounded, or a Luenberger observer with an [`ObserverGain`]. Each row gives a [`StateEstimate`] with
+//!   [`StateValues`].
 //! - [`SmoothedStates`] are those given all rows, [`FilterSnapshot`] is a filter that is stored to go on later,
 //!   [`FilterSummary`] is the document of a run, with an [`EstimatedNumber`] for each unknown parameter.
 //!

@@ -3,7 +3,8 @@
 use thetahat_core::nalgebra::{Complex, Const, Matrix3, RowVector3, SMatrix, SVector, Vector1, Vector3};
 use thetahat_core::{
     Action, Covariance, Error, ExtendedKalmanFilter, Innovation, KalmanFilter, LinearObservation,
-    LinearTransition, LuenbergerObserver, Observation, Transition,
+    LinearTransition, LuenbergerObserver, Observation, SetInnovation, Transition, UnscentedKalmanFilter,
+    ZonotopeFilter,
 };
 
 use crate::record::{Sample, sample};
@@ -152,6 +153,78 @@ impl Scenario for Extended {
 
     fn numbers(&self, innovation: &Self::Output, number: &mut impl FnMut(f32)) {
         filter_numbers(innovation, self.filter.state(), self.filter.covariance(), number);
+    }
+}
+
+/// The unscented Kalman filter of the same spring.
+pub(crate) struct Unscented {
+    filter: UnscentedKalmanFilter<f32, Const<3>>,
+    spring: Spring,
+}
+
+impl Scenario for Unscented {
+    const NAME: &'static str = "UnscentedKalmanFilter, 3 x 1";
+    type Input = Sample;
+    type Output = Innovation<f32, Vector1<f32>>;
+
+    fn start(case: Case) -> Result<Self, Error> {
+        let Extended { filter, spring } = Extended::start(case)?;
+        let filter = UnscentedKalmanFilter::new(*filter.state(), filter.covariance().clone())?;
+        Ok(Unscented { filter, spring })
+    }
+
+    fn input(case: Case, k: usize) -> Sample {
+        sample(case, k, 0)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, sample: &Sample) -> Result<Self::Output, Error> {
+        let input = Vector1::new(sample.u);
+        self.filter.predict(&self.spring, &input)?;
+        self.filter.correct(&self.spring, &input, &Vector1::new(sample.y))
+    }
+
+    fn numbers(&self, innovation: &Self::Output, number: &mut impl FnMut(f32)) {
+        filter_numbers(innovation, self.filter.state(), self.filter.covariance(), number);
+    }
+}
+
+/// The set of a position and a rate, of twenty generators.
+pub(crate) struct Set {
+    filter: ZonotopeFilter<f32, Const<2>, Const<20>>,
+    transition: LinearTransition<f32, Const<2>>,
+    observation: LinearObservation<f32, Const<2>, Const<1>>,
+}
+
+impl Scenario for Set {
+    const NAME: &'static str = "ZonotopeFilter, 2 x 1, 20";
+    type Input = Vector1<f32>;
+    type Output = SetInnovation<Vector1<f32>>;
+
+    fn start(case: Case) -> Result<Self, Error> {
+        let reach = if case == Case::Hard { 1e6 } else { 10.0 };
+        Ok(Set {
+            filter: ZonotopeFilter::new(SVector::zeros(), &SVector::repeat(reach), Const)?,
+            transition: LinearTransition::new(matrix::<2, 2>(0.5, 0.3), Covariance::zero(Const))?,
+            observation: LinearObservation::new(matrix::<1, 2>(1.0, 0.1), Covariance::zero(Const))?,
+        })
+    }
+
+    fn input(case: Case, k: usize) -> Vector1<f32> {
+        Vector1::new(sample(case, k, 0).y)
+    }
+
+    #[inline(never)]
+    fn step(&mut self, measurement: &Vector1<f32>) -> Result<Self::Output, Error> {
+        self.filter.predict(&self.transition, &SVector::repeat(1.0), &SVector::zeros())?;
+        self.filter.correct(&self.observation, &Vector1::new(2.0), &SVector::zeros(), measurement)
+    }
+
+    fn numbers(&self, told: &Self::Output, number: &mut impl FnMut(f32)) {
+        number(told.error.x);
+        number(told.bound.x);
+        number(if told.contradiction.is_some() { 1.0 } else { 0.0 });
+        self.filter.centre().iter().chain(&self.filter.reaches()).copied().for_each(number);
     }
 }
 

@@ -8,6 +8,7 @@
 //! between the host's library and the firmware's. (The exponential of [`Radial`] and [`Local`] is the same on both,
 //! and so is the hyperbolic tangent of [`Network`].)
 
+mod attitude;
 mod control;
 mod detect;
 mod kalman;
@@ -19,6 +20,7 @@ mod recursive;
 
 use core::fmt;
 
+pub use attitude::{Attitude, FIELD, GRAVITY, Gyroscope, Sensors};
 use thetahat_core::{Error, Local, Neighbours, Network, Polynomial, Radial, Spline};
 
 /// How often an estimator is stepped in each [`Case`].
@@ -89,6 +91,9 @@ pub fn visit_all(visitor: &mut impl Visitor) {
     visitor.visit::<kalman::Kalman<4, 2>>();
     visitor.visit::<kalman::Kalman<6, 3>>();
     visitor.visit::<kalman::Extended>();
+    visitor.visit::<kalman::Unscented>();
+    visitor.visit::<Attitude>();
+    visitor.visit::<kalman::Set>();
     visitor.visit::<late::Late>();
     visitor.visit::<kalman::Observer>();
     visitor.visit::<control::Placed>();

@@ -40,8 +40,8 @@ pub struct StateEstimate<'a> {
     pub nis_bounds: Option<(f64, f64)>,
     /// The log-likelihood of this row given those before. 0 if nothing was measured; none from an observer.
     pub log_likelihood: Option<f64>,
-    /// Where noise is bounded, the output, from 0, that no state of the set explains: a noise has left its bound, a sensor
-    /// has failed, or the model is wrong. The measurement of this row was not used then.
+    /// Where noise is bounded, the output, from 0, that no state of the set explains: a noise has left its bound, a
+    /// sensor has failed, or the model is wrong. The measurement of this row was not used then.
     pub contradiction: Option<usize>,
     /// What was done with the measurement.
     pub action: Action,

@@ -22,9 +22,9 @@ pub enum Estimator {
     /// The unscented Kalman filter: for any model. Its deviations know how the model bends within them. Unknown
     /// parameters are estimated with the state. See [`UnscentedKalmanFilter`](thetahat_core::UnscentedKalmanFilter).
     Unscented,
-    /// A set in which the state is for certain as long as noises keep their bounds, for a linear model in matrices, or a
-    /// report of polynomials or state space: see [`ZonotopeFilter`](thetahat_core::ZonotopeFilter). A row that no state of
-    /// the set explains is told, see [`contradiction`](super::StateEstimate::contradiction), and is not used.
+    /// A set in which the state is for certain as long as noises keep their bounds, for a linear model in matrices, or
+    /// a report of polynomials or state space: see [`ZonotopeFilter`](thetahat_core::ZonotopeFilter). A row that no
+    /// state of the set explains is told, see [`contradiction`](super::StateEstimate::contradiction), and is not used.
     Bounded {
         /// So many standard deviations of its noises bound those of a model that says no bounds; of a Gaussian noise
         /// none is exceeded for certain.

@@ -325,8 +325,8 @@ impl Kind {
         })
     }
 
-    /// How the outputs are weighed where an observer needs one number of them: by their noise, that of the start where it
-    /// is not the same in all rows.
+    /// How the outputs are weighed where an observer needs one number of them: by their noise, that of the start where
+    /// it is not the same in all rows.
     pub(super) fn weights(&self) -> DVector<f64> {
         let variances: Vec<f64> = match self {
             Kind::Sampled(frame, _) => frame.output_noise.diagonal().iter().copied().collect(),

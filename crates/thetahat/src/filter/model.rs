@@ -32,9 +32,8 @@ use crate::report::Report;
 /// initial_bound = [1e4]
 /// ```
 ///
-/// Where a covariance is left out beside its bound, it is that of noise that is uniform within it: bound²/3. There is also
-/// G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x
-/// outputs).
+/// Where a covariance is left out beside its bound, it is that of noise that is uniform within it: bound²/3. There is
+/// also G if there are inputs, and D and S if they are not zero (G: n x inputs, D: outputs x inputs, S: n x outputs).
 #[derive(Debug, Clone)]
 pub struct StateModel {
     pub(super) kind: Kind,

@@ -59,8 +59,8 @@ fn with_a_linear_model_all_are_the_kalman_filter() {
     assert_eq!(words, ["kalman", "iekf", "ukf"]);
 }
 
-/// Squared errors beside their variances, of the position of a point after 20 distances, over 200 logs: 2 if P is right.
-/// No filter of one mean is: a distance does not tell on which side of the sensor the point is.
+/// Squared errors beside their variances, of the position of a point after 20 distances, over 200 logs: 2 if P is
+/// right. No filter of one mean is: a distance does not tell on which side of the sensor the point is.
 #[test]
 fn deviations_promise_less_where_the_model_bends() {
     let found = [Estimator::Extended, Estimator::Iterated, Estimator::Unscented].map(|estimator| {

@@ -448,8 +448,8 @@ fn observers_hold_the_innovations_of_filter() {
     folder.write("motor.csv", include_str!("data/dc_motor.csv"));
     folder.write("spring.csv", include_str!("data/mass_spring_damper.csv"));
     folder.write("spring.toml", include_str!("data/mass_spring_damper.toml"));
-    // Linear equations have an exact step. Those of the others are integrated, with noises that are not always the same,
-    // and inputs that act later, or go in lines.
+    // Linear equations have an exact step. Those of the others are integrated, with noises that are not always the
+    // same, and inputs that act later, or go in lines.
     let motor = include_str!("data/dc_motor.toml");
     let line = motor.replace("voltage = \"u\"", "voltage = { channel = \"u\", hold = \"linear\" }");
     let noisy = |text: &str| {

@@ -12,7 +12,8 @@
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
-//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`] (with [`ProfileInterval`]s), [`SubspaceOutcome`] (with a
+//!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`] (with [`ProfileInterval`]s),
+//!   [`SubspaceOutcome`] (with a
 //!   [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`] (of
 //!   [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or
 //!   [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).

@@ -306,8 +306,8 @@ fn estimate_of(
     })
 }
 
-/// Noises that are drawn to their lower bound go there, if the likelihood does not fall by it: the search only comes near.
-/// Which of them did.
+/// Noises that are drawn to their lower bound go there, if the likelihood does not fall by it: the search only comes
+/// near. Which of them did.
 fn without_noises(unknown: &[Unknown], z: &mut [f64], criterion: &mut impl Likelihood) -> Vec<bool> {
     let mut vanishing = vec![false; z.len()];
     let Ok(value) = criterion.evaluate(z) else { return vanishing };

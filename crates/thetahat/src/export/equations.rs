@@ -4,8 +4,8 @@
 //! y(k) = h(x(k), u(k), t),   x(k+1) = f(x(k), u(k), t, dt)      or dx/dt = f, in steps of the classical method of order four (Kutta 1901)
 //! ```
 //!
-//! or in the exact step of linear equations, with the operations that the equations were compiled into. Predictors and observers correct the state by an extended
-//! Kalman filter.
+//! or in the exact step of linear equations, with the operations that the equations were compiled into. Predictors and
+//! observers correct the state by an extended Kalman filter.
 
 mod kalman;
 mod translation;

@@ -92,9 +92,9 @@ use crate::Error;
 ///
 /// **Time.** `[next]` gives the next state. With `dt`, the seconds of a step, in its equations the steps may vary, else
 /// each is one `sample_time`. `[derivative]` gives dx/dt; where it is linear in states and inputs and does not know the
-/// time, the step is exact. Else it is integrated by the classical Runge-Kutta method of order four in one step from row
-/// to row, or in `substeps` of them. A step of several sample times is taken as that many equal steps, so that a missing
-/// row does no harm.
+/// time, the step is exact. Else it is integrated by the classical Runge-Kutta method of order four in one step from
+/// row to row, or in `substeps` of them. A step of several sample times is taken as that many equal steps, so that a
+/// missing row does no harm.
 ///
 /// **Inputs** are held from row to row, or go in straight lines to the next with `force = { channel = "u", hold =
 /// "linear" }`, which needs `[derivative]`. `force(t - delay)` is an input so many seconds ago, with a delay that is a
@@ -103,9 +103,9 @@ use crate::Error;
 /// **Noise.** `process` is what a sample of length `sample_time` adds to the state: its variance grows with the length
 /// of the step, sd² dt/sample_time. A state that is not named has none. An exact step takes it as white noise of the
 /// intensity sd²/sample_time that acts all the time; else it is added at the end of the step. `measurement` is the
-/// standard deviation of each output. Each is a number; an expression of states, inputs, parameters and `t`; or unknown,
-/// `{ start = 0.1, unknown = true }`, and then a parameter by the name of `process.velocity` or `measurement.y`, above 0
-/// unless `min` says other. `start` and `sd` of a state may be expressions of parameters.
+/// standard deviation of each output. Each is a number; an expression of states, inputs, parameters and `t`; or
+/// unknown, `{ start = 0.1, unknown = true }`, and then a parameter by the name of `process.velocity` or
+/// `measurement.y`, above 0 unless `min` says other. `start` and `sd` of a state may be expressions of parameters.
 ///
 /// **Unknown parameters** have a `start`, the standard deviation `sd` of what is known of it, and perhaps bounds `min`
 /// and `max`, between which a change of variable keeps them: p = min + exp(z), p = max - exp(z), or p = min + (max -

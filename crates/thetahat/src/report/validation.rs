@@ -609,8 +609,8 @@ pub fn compare(validated: &[Validated]) -> Result<Comparison, Error> {
     })
 }
 
-/// Of all pairs of models in equations, fitted to the same values, of which the parameters of one are among those of the
-/// other.
+/// Of all pairs of models in equations, fitted to the same values, of which the parameters of one are among those of
+/// the other.
 fn likelihood_ratios(validated: &[Validated]) -> Vec<LikelihoodRatio> {
     let pairs = (0..validated.len()).flat_map(|one| (0..validated.len()).map(move |other| (one, other)));
     let ratio = |(smaller, larger): (usize, usize)| {

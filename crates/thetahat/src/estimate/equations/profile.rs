@@ -1,13 +1,13 @@
-//! Intervals by profile likelihood: all values of a parameter with which, the others at their best, the likelihood is not
-//! significantly below its largest:
+//! Intervals by profile likelihood: all values of a parameter with which, the others at their best, the likelihood is
+//! not significantly below its largest:
 //!
 //! ```text
 //! 2 (ln L(p^) - max ln L(p) over the others) <= chi²_1(0.95) f
 //! ```
 //!
-//! with the factor f by which covariances are multiplied. They know bounds and curvature, where p ± 1.96 standard errors
-//! is a parabola's. Source: Venzon and Moolgavkar, A method for computing profile-likelihood-based confidence intervals,
-//! Applied Statistics 37, 1988; Pawitan, In All Likelihood, 2001, section 2.6.
+//! with the factor f by which covariances are multiplied. They know bounds and curvature, where p ± 1.96 standard
+//! errors is a parabola's. Source: Venzon and Moolgavkar, A method for computing profile-likelihood-based confidence
+//! intervals, Applied Statistics 37, 1988; Pawitan, In All Likelihood, 2001, section 2.6.
 
 use rayon::prelude::*;
 use thetahat_numerics::distribution::two_sided;
@@ -28,8 +28,8 @@ const ITERATIONS: usize = 40;
 /// Where a noise vanishes, its interval is looked for from this fraction of its start on.
 const LITTLE: f64 = 1e-3;
 
-/// The two ends of the interval of 95 % of each parameter, in its own unit; none where the likelihood falls no further on
-/// that side, be it to a bound. About twenty searches for each parameter.
+/// The two ends of the interval of 95 % of each parameter, in its own unit; none where the likelihood falls no further
+/// on that side, be it to a bound. About twenty searches for each parameter.
 pub(crate) fn intervals(
     model: &GreyBox,
     experiments: &[Experiment],
@@ -84,7 +84,8 @@ pub(crate) fn intervals(
     Ok(ends.chunks_exact(2).map(ordered).collect())
 }
 
-/// Where a function that begins below 0 crosses it, by doubling and then by the Illinois method (Dowell and Jarratt 1971).
+/// Where a function that begins below 0 crosses it, by doubling and then by the Illinois method (Dowell and Jarratt
+/// 1971).
 fn crossing(
     away: &mut impl FnMut(f64) -> Result<f64, Error>,
     width: f64,

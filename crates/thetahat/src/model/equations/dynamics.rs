@@ -261,7 +261,8 @@ impl GreyBox {
         self.process_variances(&leaves, dt, variances, work);
     }
 
-    /// The exact step of a sample, where there is one and nothing is unknown: Phi, Psi and X, and Q, column after column.
+    /// The exact step of a sample, where there is one and nothing is unknown: Phi, Psi and X, and Q, column after
+    /// column.
     pub(crate) fn exact_matrices(&self) -> Option<[Vec<f64>; 4]> {
         let Step::Exact(_) = self.step else { return None };
         let (n, mut work) = (self.states.len(), Work::new());

@@ -15,8 +15,8 @@
 //! ```
 //!
 //! Sources: Van Loan, Computing integrals involving the matrix exponential, IEEE Transactions on Automatic Control 23,
-//! 1978; Moler and Van Loan, Nineteen dubious ways to compute the exponential of a matrix, twenty-five years later, SIAM
-//! Review 45, 2003, method 3.
+//! 1978; Moler and Van Loan, Nineteen dubious ways to compute the exponential of a matrix, twenty-five years later,
+//! SIAM Review 45, 2003, method 3.
 
 use thetahat_core::Number;
 

@@ -140,8 +140,8 @@ pub struct LikelihoodRatio {
     pub ratio: f64,
     /// The further parameters.
     pub parameters: Vec<String>,
-    /// The probability of as large a ratio if they say nothing. It is too large for a noise that the smaller model has at
-    /// 0, at most by the factor 2.
+    /// The probability of as large a ratio if they say nothing. It is too large for a noise that the smaller model has
+    /// at 0, at most by the factor 2.
     pub p_value: f64,
 }
 

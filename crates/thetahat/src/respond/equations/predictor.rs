@@ -11,9 +11,9 @@
 //! after the first are corrected for what it moved: e_j = y_j - h_j(x^) - H_j (x - x^). In dual numbers the same
 //! operations give de/dz and dS/dz, exact but for rounding.
 //!
-//! Time update: Thornton's modified weighted Gram-Schmidt on [F U | U_q] with the weights (D, D_q), Q = U_q D_q U_q'. Measurement update:
-//! Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete Sequential Estimation, 1977,
-//! chapters V and VI).
+//! Time update: Thornton's modified weighted Gram-Schmidt on [F U | U_q] with the weights (D, D_q), Q = U_q D_q U_q'.
+//! Measurement update: Bierman's. Both keep D from going negative (Bierman, Factorization Methods for Discrete
+//! Sequential Estimation, 1977, chapters V and VI).
 //!
 //! thetahat-core updates the same factors by other arithmetic, made for plain numbers on small processors: reciprocals
 //! for divisions, four rows of U at a time, a threshold below which variances count as zero, and F P F' + Q factored

@@ -1,5 +1,5 @@
-//! Noises, inputs between samples, and starts that are parameters: the likelihood beside a dense Kalman filter that shares
-//! nothing with it, and what a fit finds.
+//! Noises, inputs between samples, and starts that are parameters: the likelihood beside a dense Kalman filter that
+//! shares nothing with it, and what a fit finds.
 
 use thetahat_core::nalgebra::{DMatrix, DVector};
 use thetahat_numerics::noise::Noise;
@@ -65,7 +65,8 @@ fn exponential(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     (0..12).fold(sum, |power, _| &power * &power)
 }
 
-/// One step of h hours by the matrix exponential of [A B 0; 0 0 I; 0 0 0], and Q by that of [-A q; 0 A'] (Van Loan 1978).
+/// One step of h hours by the matrix exponential of [A B 0; 0 0 I; 0 0 0], and Q by that of [-A q; 0 A'] (Van Loan
+/// 1978).
 struct Dense {
     transition: DMatrix<f64>,
     now: DMatrix<f64>,
@@ -222,8 +223,8 @@ process = { level = { start = 10, unknown = true } }
 measurement = { y = { start = 10, unknown = true } }
 ";
 
-/// Durbin and Koopman, Time Series Analysis by State Space Methods, 2nd ed. 2012, section 2.2: the level starts unknown, and
-/// the first year only says where.
+/// Durbin and Koopman, Time Series Analysis by State Space Methods, 2nd ed. 2012, section 2.2: the level starts
+/// unknown, and the first year only says where.
 #[test]
 fn the_variances_of_the_nile_are_those_of_the_book() {
     let found = fitted(&GreyBox::from_toml(NILE).unwrap(), &[nile()]).unwrap();

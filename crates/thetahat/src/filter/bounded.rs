@@ -14,14 +14,6 @@ pub(super) type StateSet = ZonotopeFilter<f64, Dyn, Dyn>;
 /// How many generators a set has for each state: see [`ZonotopeFilter`].
 const GENERATORS: usize = 10;
 
-/// The largest magnitudes of noises, and of what is not known of the state at the first row.
-#[derive(Debug, Clone)]
-pub(super) struct Bounds {
-    pub(super) process: DVector<f64>,
-    pub(super) measurement: DVector<f64>,
-    pub(super) initial: DVector<f64>,
-}
-
 /// A set, and what bounds the noises where the model does not say it: so many of their standard deviations.
 #[derive(Debug, Clone)]
 pub(super) struct Bounded {

@@ -3,6 +3,7 @@ use thetahat_core::nalgebra::{Complex, DMatrix, DVector};
 use super::bounded::Bounded;
 use super::kind::{Filter, Kind, Motion, Observer, Unscented};
 use super::model::StateModel;
+use super::row::Certainty;
 use crate::Error;
 use crate::figures::number;
 
@@ -73,16 +74,6 @@ pub(super) enum Engine {
     Unscented(Unscented),
     Bounded(Bounded),
     Observer { observer: Observer, poles: Option<DVector<Complex<f64>>> },
-}
-
-/// What an estimator says beside its estimates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Certainty {
-    /// Standard deviations.
-    Deviations,
-    /// How far at most the state is from them.
-    Bounds,
-    Nothing,
 }
 
 impl Engine {

@@ -13,31 +13,13 @@ use super::lags::Lags;
 use super::linear::Linear;
 use super::linearization::{Function, Linearization, Work};
 use super::past::Past;
+pub(super) use super::past::Sample;
 use crate::data::Offset;
 use crate::model::{GreyBox, equations::whole_steps};
 
 pub(super) type Filter = ExtendedKalmanFilter<f64, Dyn>;
 pub(super) type Unscented = UnscentedKalmanFilter<f64, Dyn>;
 pub(super) type Observer = LuenbergerObserver<f64, Dyn, Dyn>;
-
-/// A row as a model sees it: deviations from the channels' offsets.
-#[derive(Debug, Clone)]
-pub(super) struct Sample {
-    /// Seconds since the first row.
-    pub(super) time: f64,
-    pub(super) inputs: DVector<f64>,
-    /// NaN where one is missing.
-    pub(super) outputs: DVector<f64>,
-}
-
-impl Sample {
-    /// What drives a state where the noises are correlated: inputs, and outputs that are there.
-    pub(super) fn drives(&self) -> DVector<f64> {
-        let outputs = self.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
-        let drives: Vec<f64> = self.inputs.iter().copied().chain(outputs).collect();
-        drives.into()
-    }
-}
 
 /// How the time from one row to the next is taken: how many steps, and the seconds of each.
 pub(super) type Division = (usize, f64);
@@ -154,6 +136,14 @@ pub(super) enum Motion {
 }
 
 impl Kind {
+    /// What it has to remember of its inputs, before the first row.
+    pub(super) fn past(&self) -> Past {
+        match self {
+            Kind::Grey(grey) => Past::new(grey),
+            Kind::Sampled(..) => Past::default(),
+        }
+    }
+
     /// The filter that stands where the model starts.
     pub(super) fn started(&self) -> Result<Filter, Error> {
         match self {

@@ -5,10 +5,17 @@ use std::borrow::Cow;
 use thetahat_core::nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use thetahat_core::{Covariance, LinearTransition};
 
-use super::bounded::Bounds;
 use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
 use crate::model::{Signal, StateSpace};
+
+/// The largest magnitudes of noises, and of what is not known of the state at the first row.
+#[derive(Debug, Clone)]
+pub(super) struct Bounds {
+    pub(super) process: DVector<f64>,
+    pub(super) measurement: DVector<f64>,
+    pub(super) initial: DVector<f64>,
+}
 
 type Transition = LinearTransition<f64, Dyn, Dyn>;
 

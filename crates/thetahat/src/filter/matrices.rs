@@ -3,9 +3,8 @@
 use thetahat_core::Covariance;
 use thetahat_core::nalgebra::{DMatrix, DVector, Dyn};
 
-use super::bounded::Bounds;
 use super::frame::{Frame, Names};
-use super::linear::{Linear, Matrices};
+use super::linear::{Bounds, Linear, Matrices};
 use crate::Error;
 use crate::model::equations::{Entry, Section};
 

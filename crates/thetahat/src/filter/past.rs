@@ -1,11 +1,32 @@
 //! What a model in equations knows of its inputs: those of this row and of the one before, and as far back as its
 //! delays reach.
 
-use super::kind::{Kind, Sample};
+use thetahat_core::nalgebra::DVector;
+
+use crate::model::GreyBox;
 use crate::model::equations::Drive;
 
 /// So many times the longest delay is remembered where it is unknown.
 const SPARE: f64 = 4.0;
+
+/// A row as a model sees it: deviations from the channels' offsets.
+#[derive(Debug, Clone)]
+pub(super) struct Sample {
+    /// Seconds since the first row.
+    pub(super) time: f64,
+    pub(super) inputs: DVector<f64>,
+    /// NaN where one is missing.
+    pub(super) outputs: DVector<f64>,
+}
+
+impl Sample {
+    /// What drives a state where the noises are correlated: inputs, and outputs that are there.
+    pub(super) fn drives(&self) -> DVector<f64> {
+        let outputs = self.outputs.iter().map(|output| if output.is_nan() { 0.0 } else { *output });
+        let drives: Vec<f64> = self.inputs.iter().copied().chain(outputs).collect();
+        drives.into()
+    }
+}
 
 /// The latest rows; none for a model that needs but the inputs of one.
 #[derive(Debug, Clone, Default)]
@@ -19,8 +40,7 @@ pub(super) struct Past {
 }
 
 impl Past {
-    pub(super) fn new(kind: &Kind) -> Self {
-        let Kind::Grey(grey) = kind else { return Self::default() };
+    pub(super) fn new(grey: &GreyBox) -> Self {
         let spare = if grey.parameters().is_empty() { 1.0 } else { SPARE };
         let reach = match grey.longest_delay() {
             Some(delay) => Some(delay * spare),

@@ -6,9 +6,18 @@ use thetahat_core::{Action, Error, Innovation};
 use thetahat_numerics::distribution::chi_square_interval;
 
 use super::estimate::{StateEstimate, StateValues};
-use super::estimator::Certainty;
 use super::kind::{Expected, Gaussian, Kind, Sample};
 use super::model::StateModel;
+
+/// What an estimator says beside its estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Certainty {
+    /// Standard deviations.
+    Deviations,
+    /// How far at most the state is from them.
+    Bounds,
+    Nothing,
+}
 
 /// The numbers of one row.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -6,7 +6,6 @@ use super::estimate::StateValues;
 use super::estimator::Engine;
 use super::kind::{Division, Kind, Recursion, Sample, Unscented};
 use super::linearization::Work;
-use super::past::Past;
 use crate::Error;
 
 /// The states of a record, each given all of its rows, later ones too.
@@ -120,7 +119,7 @@ fn smoothed<S: Recursion>(
     history: &[(Option<Division>, Sample)],
     smooth: impl FnOnce(&S) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error>,
 ) -> Result<Vec<Smoothed<f64, Dyn>>, thetahat_core::Error> {
-    let (mut past, mut work) = (Past::new(kind), Work::new());
+    let (mut past, mut work) = (kind.past(), Work::new());
     // Which of the smoother's samples a row is.
     let (mut place, mut places) = (0, Vec::with_capacity(history.len()));
     let mut previous = None;

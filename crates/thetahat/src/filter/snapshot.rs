@@ -7,7 +7,6 @@ use super::StateFilter;
 use super::bounded::StateSet;
 use super::estimator::Engine;
 use super::kind::{Filter, Observer, Sample, Unscented};
-use super::past::Past;
 use super::row::{Row, Told};
 use super::totals::Totals;
 use crate::Error;
@@ -113,7 +112,7 @@ impl StateFilter {
             && previous.is_some() == told.is_some()
             && previous.is_some() == (totals.rows > 0)
             && row.is_like(&self.row);
-        let past = Past::new(&self.model.kind).with_rows(past.0, past.1, inputs);
+        let past = self.model.kind.past().with_rows(past.0, past.1, inputs);
         let Some(past) = past.filter(|_| fits) else {
             return Err(Error::data("the snapshot is of a filter of another model or estimator"));
         };

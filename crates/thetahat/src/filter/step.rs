@@ -1,12 +1,12 @@
 use thetahat_core::nalgebra::DVector;
 
 use super::estimate::StateEstimate;
-use super::estimator::{Certainty, Engine, Estimator};
+use super::estimator::{Engine, Estimator};
 use super::kind::{Division, Gaussian, Kind, Motion, Sample};
 use super::linearization::Work;
 use super::model::StateModel;
 use super::past::Past;
-use super::row::{Row, Told};
+use super::row::{Certainty, Row, Told};
 use super::totals::Totals;
 use crate::Error;
 use crate::data::Offset;
@@ -85,7 +85,7 @@ impl StateFilter {
     /// [`Error::Argument`] if the model is not for this estimator, or an observer's poles or gain do not fit the model.
     pub fn new(model: StateModel, estimator: Estimator) -> Result<Self, Error> {
         let (word, engine) = (estimator.word(), Engine::new(&model, estimator)?);
-        let (row, past) = (Row::new(&model), Past::new(&model.kind));
+        let (row, past) = (Row::new(&model), model.kind.past());
         Ok(Self {
             model,
             past,

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::StateFilter;
 use super::estimate::StateValues;
-use super::estimator::Certainty;
+use super::row::Certainty;
 use crate::Document;
 use crate::document::document_methods;
 use crate::respond::NisSummary;

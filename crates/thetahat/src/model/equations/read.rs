@@ -50,8 +50,6 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     let estimated: Vec<&Entry<'_>> = states.iter().chain(unknowns.map(|(entry, _)| entry)).collect();
     few(&estimated, "states and unknown parameters together")?;
     few(&inputs.iter().map(|(entry, _)| entry).collect::<Vec<_>>(), "inputs")?;
-    let (step, equations) = equations(&root)?;
-
     let mut graph = Graph::new();
     let mut scope = Scope { names: Vec::new(), time: graph.leaf(Operation::Time), step: None };
     for (index, state) in states.iter().enumerate() {
@@ -71,7 +69,10 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         };
         scope.declare(entry.key, node, &entry)?;
     }
+    let mut reader = Reader { scope: &scope, graph: &mut graph, unknown: &mut unknown, known };
+    let started = states.iter().map(|state| reader.start(state)).collect::<Result<Vec<_>, _>>()?;
 
+    let (step, equations) = equations(&root)?;
     let written = equations.entries();
     if let Some(entry) = written.iter().find(|entry| !states.iter().any(|state| state.key == entry.key)) {
         let near = suggestion(entry.key, states.iter().map(|state| state.key));
@@ -106,7 +107,6 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
     }
     let noise = needed("noise", "a table of standard deviations, such as [noise] measurement = { y = 0.1 }")?;
     let mut reader = Reader { scope: &scope, graph: &mut graph, unknown: &mut unknown, known };
-    let started = states.iter().map(|state| reader.start(state)).collect::<Result<Vec<_>, _>>()?;
     let [process, measurement] = reader.noises(&noise, &states, &outputs)?;
     let estimated = states.len() + unknown.len();
     if estimated > MOST {

@@ -638,7 +638,20 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
         3,
         "is a line in the time of its log",
     );
-    let after: Vec<String> = folder.names().into_iter().filter(|name| name != "line.json").collect();
+    // In a line, and later.
+    let late = include_str!("data/dc_motor.toml")
+        .replace("voltage = \"u\"", "voltage = { channel = \"u\", hold = \"linear\" }")
+        .replace("(voltage -", "(voltage(t - 0.02) -");
+    folder.write("late.toml", late);
+    folder.done("fit dc_motor.csv --time t --grey late.toml --report late.json");
+    folder.assert_refused(
+        "export late.json --to c --what simulator",
+        3,
+        "goes in straight lines and acts later cannot be exported",
+    );
+    let own = ["line.json", "late.json", "late.toml"];
+    let after: Vec<String> =
+        folder.names().into_iter().filter(|name| !own.contains(&name.as_str())).collect();
     assert_eq!(after, before);
 }
 

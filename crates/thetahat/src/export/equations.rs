@@ -22,8 +22,8 @@ use translation::{Leaves, translated};
 /// The program of a model.
 ///
 /// # Errors
-/// [`Error::Model`] and [`Error::Report`] for equations that are none any more; [`Error::Argument`] for what such a
-/// model has not.
+/// [`Error::Model`] and [`Error::Report`] for equations that are none any more, and for inputs that go in lines and act
+/// later; [`Error::Argument`] for what such a model has not.
 pub(super) fn form(whole: &Model, model: &EquationsModel, purpose: Purpose) -> Result<Form, Error> {
     let is_corrected = match purpose {
         Purpose::Simulator => false,
@@ -31,6 +31,13 @@ pub(super) fn form(whole: &Model, model: &EquationsModel, purpose: Purpose) -> R
         _ => return Err(refused(purpose, "a model in equations", "simulator, predictor or observer")),
     };
     let equations = model.with_values()?;
+    let mut lines = equations.delays().into_iter().zip(equations.linear_holds());
+    if lines.any(|(delay, is_line)| delay.is_some() && *is_line) {
+        return Err(Error::report(
+            "an input that goes in straight lines and acts later cannot be exported: hold it (hold = \"zero\"), or leave out its \
+             delay",
+        ));
+    }
     let mut program = Program::default();
     let signals = Signals::of(&mut program, whole)?;
     let run = Run::new(&mut program, &equations, model, is_corrected);

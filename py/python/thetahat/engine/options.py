@@ -135,7 +135,7 @@ def plan(arguments: Mapping[str, Any], rows: int | None = None) -> str:
             found["regressor"] = [text(name, one) for one in value] or None
         elif name == "feedthrough":
             found[name] = "yes" if flag(name, value) else "no"
-        elif name in ("trend", "raw_terms", "drawn", "delay") or (name == "constant" and isinstance(value, bool)):
+        elif name in ("trend", "raw_terms", "drawn", "delay", "profile") or (name == "constant" and isinstance(value, bool)):
             found[name] = flag(name, value)
         elif name in ("past", "future"):
             found[name] = count(name, value)

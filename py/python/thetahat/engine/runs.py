@@ -70,4 +70,4 @@ class Simulates:
         array([0. , 1. , 1.9])
         """
         model = self._filtered()
-        return predicted(_thetahat.StateFilter(model, None, None, None), len(model.inputs), u, steps)
+        return predicted(_thetahat.StateFilter(model, None, None, None, None), len(model.inputs), u, steps)

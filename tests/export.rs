@@ -639,9 +639,10 @@ fn what_cannot_be_exported_is_refused_and_nothing_written() {
         "is a line in the time of its log",
     );
     // In a line, and later.
-    let late = include_str!("data/dc_motor.toml")
-        .replace("voltage = \"u\"", "voltage = { channel = \"u\", hold = \"linear\" }")
-        .replace("(voltage -", "(voltage(t - 0.02) -");
+    let late = "sample_time = 0.01\n[states]\nx = { start = 0, sd = 10 }\n[parameters]\n\
+                k = { start = 1, sd = 1, unknown = true }\n\
+                [inputs]\nv = { channel = 'u', hold = 'linear' }\n[derivative]\nx = 'k * v(t - 0.02) - x'\n\
+                [outputs]\ny = 'x'\n[noise]\nprocess = { x = 1 }\nmeasurement = { y = 1 }\n";
     folder.write("late.toml", late);
     folder.done("fit dc_motor.csv --time t --grey late.toml --report late.json");
     folder.assert_refused(

@@ -51,6 +51,10 @@ def main():
             theirs = {"filterpy": step_filterpy, "pykalman": step_pykalman}
             data = read(folder, f"kalman-{size}.json")
             rows += compare(server, size, f"Kalman filter, {size}", theirs, data)
+        for size in ("4x2", "6x3"):
+            rows += compare(server, f"ekf-{size}", f"extended Kalman filter, {size}", {}, None)
+        for size in ("4x2", "6x3"):
+            rows += compare(server, f"ukf-{size}", f"unscented Kalman filter, {size}", {}, None)
         for size in ("4", "8", "16"):
             data = read(folder, f"rls-{size}.json")
             work = f"recursive least squares, {size}"

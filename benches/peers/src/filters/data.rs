@@ -12,6 +12,12 @@ use crate::signals::signals;
 /// Samples of each record.
 pub(crate) const SAMPLES: usize = 2000;
 
+/// The time between samples of a motion, in s.
+pub(crate) const DT: f64 = 0.1;
+
+/// The drag of a motion that is not linear, in s/m².
+pub(crate) const DRAG: f64 = 1e-3;
+
 /// The forgetting factor of recursive least squares.
 pub(crate) const FORGETTING: f64 = 0.99;
 
@@ -38,7 +44,7 @@ fn matrix<const R: usize, const C: usize>(element: impl Fn(usize, usize) -> f64)
 /// measured with a standard deviation of 0.5 m, then the velocities, driven by white acceleration of density
 /// 1 m²/s³.
 pub(crate) fn constant_velocity<const N: usize, const M: usize>() -> Model<f64, N, M> {
-    let dt = 0.1;
+    let dt = DT;
     // The element of a matrix that holds [a b; b c] for each dimension and nothing between two of them.
     let blocks = |i: usize, j: usize, [a, b, c]: [f64; 3]| match (i / M, j / M) {
         _ if i % M != j % M => 0.0,

@@ -13,6 +13,7 @@ mod signals;
 mod data;
 mod kalman;
 mod nalgebra_form;
+mod nonlinear;
 mod ours;
 mod peers;
 mod survival;

@@ -197,7 +197,7 @@ pub(crate) struct Kfilter<T: na34::RealField, const N: usize, const M: usize> {
 }
 
 /// A matrix of kfilter's nalgebra from rows.
-fn matrix34<T: na34::RealField + Copy, const R: usize, const C: usize>(
+pub(crate) fn matrix34<T: na34::RealField + Copy, const R: usize, const C: usize>(
     rows: &[[T; C]; R],
 ) -> na34::SMatrix<T, R, C> {
     na34::SMatrix::from_fn(|i, j| rows[i][j])

@@ -129,15 +129,23 @@ const C: House = House {
         &["memory", "shapes"],
         &["innovation", "learning"],
         &["arx", "detector", "rls", "rst", "tuner"],
-        &["linear"],
-        &["ekf", "kalman", "luenberger"],
+        &["functions", "linear"],
+        &["ekf", "kalman", "luenberger", "ukf"],
         &["sizes"],
     ],
 };
 
 const PEERS: House = House {
     source: "benches/peers/src/filters",
-    floors: &[&["data"], &["kalman"], &["nalgebra_form"], &["ours"], &["peers"], &["survival", "timing"]],
+    floors: &[
+        &["data"],
+        &["kalman"],
+        &["nalgebra_form"],
+        &["ours"],
+        &["peers"],
+        &["nonlinear"],
+        &["survival", "timing"],
+    ],
 };
 
 /// A module by its path from the root of its crate, which is the empty one.

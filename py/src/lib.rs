@@ -1,9 +1,10 @@
 //! The compiled module `thetahat._thetahat`: the engine behind the Python package `thetahat`.
 //!
 //! `log`, `grey_box`, `model`, `normal_equations`, `experiments`, `evaluation` and `design` are the batch half,
-//! `online` the steppers, `filter` and `track` the steppers behind logs. `journal` is what has been done with which of
-//! many logs. `plan` reads options of a fit, `array` reads and makes NumPy arrays, `error` is the one map of errors,
-//! `in_use` what is said of an object that another call uses, `work` runs what takes long.
+//! `online` the steppers, `filter` and `track` the steppers behind logs, `noise` the noises that a filter needs.
+//! `journal` is what has been done with which of many logs. `plan` reads options of a fit, `array` reads and makes
+//! NumPy arrays, `error` is the one map of errors, `in_use` what is said of an object that another call uses, `work`
+//! runs what takes long.
 
 mod array;
 mod design;
@@ -16,6 +17,7 @@ mod in_use;
 mod journal;
 mod log;
 mod model;
+mod noise;
 mod normal_equations;
 mod online;
 mod plan;
@@ -53,6 +55,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<filter::StateModel>()?;
     module.add_class::<filter::StateFilter>()?;
     module.add_class::<track::Tracker>()?;
+    module.add_function(wrap_pyfunction!(noise::fit_noise, module)?)?;
     module.add_function(wrap_pyfunction!(experiments::answer, module)?)?;
     module.add_function(wrap_pyfunction!(experiments::answer_equations, module)?)?;
     module.add_function(wrap_pyfunction!(experiments::fit_equations_distributed, module)?)?;
@@ -61,6 +64,7 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(model::fit, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_equations, module)?)?;
     module.add_function(wrap_pyfunction!(model::fit_response, module)?)?;
+    module.add_function(wrap_pyfunction!(model::fit_equations_to_response, module)?)?;
     module.add_function(wrap_pyfunction!(templates::template, module)?)?;
     module.add_function(wrap_pyfunction!(templates::templates, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::validate, module)?)?;
@@ -70,6 +74,8 @@ fn _thetahat(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(evaluation::inspection, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::topics, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::spectrum, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::given_response, module)?)?;
+    module.add_function(wrap_pyfunction!(evaluation::response_within, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::step_test, module)?)?;
     module.add_function(wrap_pyfunction!(evaluation::sine_test, module)?)?;
     module.add_function(wrap_pyfunction!(design::control, module)?)?;

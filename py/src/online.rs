@@ -5,6 +5,7 @@
 
 pub(crate) mod argument;
 mod armax;
+mod around;
 mod arx;
 mod callable;
 mod controller;
@@ -26,6 +27,7 @@ mod recursive_model;
 pub(crate) mod results;
 mod self_tuner;
 mod trajectory;
+mod unscented;
 mod used;
 mod vector_arx;
 mod windowed;
@@ -59,6 +61,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<callable::NonlinearObservation>()?;
     module.add_class::<kalman::KalmanFilter>()?;
     module.add_class::<extended::ExtendedKalmanFilter>()?;
+    module.add_class::<unscented::UnscentedKalmanFilter>()?;
     module.add_class::<out_of_sequence::OutOfSequenceFilter>()?;
     module.add_class::<luenberger::LuenbergerObserver>()?;
     module.add_class::<detector::ChangeDetector>()?;
@@ -120,6 +123,10 @@ fn _restore<'py>(py: Python<'py>, class_name: &str, kept: &Bound<'py, PyAny>) ->
         "ExtendedKalmanFilter" => {
             let (filter, held) = held::Held::read(kept)?;
             any(Bound::new(py, extended::ExtendedKalmanFilter { filter, held })?.into_any())
+        }
+        "UnscentedKalmanFilter" => {
+            let (filter, held) = held::Held::read(kept)?;
+            any(Bound::new(py, unscented::UnscentedKalmanFilter { filter, held })?.into_any())
         }
         "LuenbergerObserver" => {
             let (observer, held) = held::Held::read(kept)?;

@@ -15,6 +15,7 @@
 #define THETAHAT_ARMAX_WORDS(n) THETAHAT_WORDS(2 * (n) * (n) + 4 * (n) + 26, 96 + 7 * (n))
 #define THETAHAT_KALMAN_WORDS(n, m) THETAHAT_WORDS((n) * (4 * (n) + (m) + 5) + (m) * ((m) + 4) + 1, 56)
 #define THETAHAT_EKF_WORDS(n, m) THETAHAT_WORDS((n) * (2 * (n) + 1) + (m) * (m) + 1, 40)
+#define THETAHAT_UKF_WORDS(n, m) THETAHAT_WORDS((n) * (2 * (n) + 1) + (m) * (m) + 2, 32)
 #define THETAHAT_LUENBERGER_WORDS(n, m) THETAHAT_WORDS((n) * (3 * (n) + 2 * (m) + 5) + (m) * ((m) + 4), 48)
 #define THETAHAT_RST_WORDS(n) THETAHAT_WORDS(4 * (n) + 4, 16)
 #define THETAHAT_INDIRECT_WORDS(na, nb) \
@@ -378,6 +379,13 @@ typedef struct thetahat_tuner thetahat_tuner;
 // Both have a constant for loads.
 typedef struct thetahat_tuner_size thetahat_tuner_size;
 
+// The unscented Kalman filter of x(k+1) = f(x) + w, y = h(x) + v, with w ~ (0, Q) and v ~ (0, R). It evaluates f and h
+// at 2 n + 1 points around the estimate, and never asks for a Jacobian.
+typedef struct thetahat_ukf thetahat_ukf;
+
+// The numbers of states and outputs of a `thetahat_ukf`: `thetahat_ukf_4_2` for 4 states and 2 outputs.
+typedef struct thetahat_ukf_size thetahat_ukf_size;
+
 // A word of the memory that an object is given: so it is aligned for whatever stands in it.
 typedef uint64_t thetahat_word;
 
@@ -490,7 +498,7 @@ typedef void (*thetahat_function_of_state)(const thetahat_number *state, thetaha
 typedef struct {
     // f(x), n numbers, or h(x), m numbers.
     thetahat_function_of_state value;
-    // df/dx, n x n, or dh/dx, m x n, row by row.
+    // df/dx, n x n, or dh/dx, m x n, row by row. An unscented filter does not call it: it may be NULL there.
     thetahat_function_of_state jacobian;
     // What the functions are called with.
     void *context;
@@ -718,6 +726,36 @@ extern const thetahat_ekf_size thetahat_ekf_6_1;
 extern const thetahat_ekf_size thetahat_ekf_6_2;
 
 extern const thetahat_ekf_size thetahat_ekf_6_3;
+
+extern const thetahat_ukf_size thetahat_ukf_1_1;
+
+extern const thetahat_ukf_size thetahat_ukf_2_1;
+
+extern const thetahat_ukf_size thetahat_ukf_2_2;
+
+extern const thetahat_ukf_size thetahat_ukf_3_1;
+
+extern const thetahat_ukf_size thetahat_ukf_3_2;
+
+extern const thetahat_ukf_size thetahat_ukf_3_3;
+
+extern const thetahat_ukf_size thetahat_ukf_4_1;
+
+extern const thetahat_ukf_size thetahat_ukf_4_2;
+
+extern const thetahat_ukf_size thetahat_ukf_4_3;
+
+extern const thetahat_ukf_size thetahat_ukf_5_1;
+
+extern const thetahat_ukf_size thetahat_ukf_5_2;
+
+extern const thetahat_ukf_size thetahat_ukf_5_3;
+
+extern const thetahat_ukf_size thetahat_ukf_6_1;
+
+extern const thetahat_ukf_size thetahat_ukf_6_2;
+
+extern const thetahat_ukf_size thetahat_ukf_6_3;
 
 extern const thetahat_luenberger_size thetahat_luenberger_1_1;
 
@@ -1456,6 +1494,88 @@ thetahat_error thetahat_tuner_set_gain_sign(thetahat_tuner *tuner, thetahat_numb
 thetahat_error thetahat_tuner_set_fallback(thetahat_tuner *tuner,
                                            int32_t kind,
                                            thetahat_number input);
+
+// Makes a filter that starts from this state and the covariance of its error. Set the noise next.
+//
+// - ukf: where its handle goes. It points into the memory.
+// - memory, bytes: at least `THETAHAT_UKF_WORDS(n, m)` words, and their size in bytes.
+// - size: `&thetahat_ukf_n_m` for n states and m outputs.
+// - state: x, n numbers.
+// - covariance: P, n x n, symmetric; NULL for 0, a state that is known.
+//
+// Errors: MEMORY_TOO_SMALL; NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+thetahat_error thetahat_ukf_init(thetahat_ukf **ukf,
+                                 thetahat_word *memory,
+                                 size_t bytes,
+                                 const thetahat_ukf_size *size,
+                                 const thetahat_number *state,
+                                 const thetahat_number *covariance);
+
+// Sets Q, n x n, and R, m x m; NULL for 0. Set them again where they depend on the state or vary in time. About n^3 +
+// m^3 multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+thetahat_error thetahat_ukf_set_noise(thetahat_ukf *ukf,
+                                      const thetahat_number *process_noise,
+                                      const thetahat_number *measurement_noise);
+
+// Puts the state where it is known to be, n numbers. P stays, and what the gate has counted starts anew.
+//
+// Errors: NOT_FINITE.
+thetahat_error thetahat_ukf_set_state(thetahat_ukf *ukf, const thetahat_number *state);
+
+// Sets P, the covariance of the error of the state, n x n, symmetric; NULL for 0. The state stays. 2.5 n^3
+// multiply-adds.
+//
+// Errors: NOT_FINITE; NOT_SYMMETRIC; NOT_POSITIVE.
+thetahat_error thetahat_ukf_set_covariance(thetahat_ukf *ukf, const thetahat_number *covariance);
+
+// Takes P for larger by a factor, at least 1: the next measurements move the state more. For a state that is less sure
+// than P says, as after a fault.
+//
+// Errors: OUT_OF_RANGE; OVERFLOW.
+thetahat_error thetahat_ukf_widen(thetahat_ukf *ukf,
+                                  thetahat_number factor);
+
+// Sets a gate, and after how many measurements above it in a row it lets go: as `thetahat_kalman_set_gate`.
+//
+// Errors: OUT_OF_RANGE.
+thetahat_error thetahat_ukf_set_gate(thetahat_ukf *ukf, thetahat_number gate, uint32_t release);
+
+// Sets how many standard deviations the points are from the estimate: sqrt(3) at first, 1 ... 10. Smaller: for
+// functions that are not defined far away, or bend otherwise there. With 1 the covariance knows nothing of bends.
+//
+// Errors: OUT_OF_RANGE.
+thetahat_error thetahat_ukf_set_spread(thetahat_ukf *ukf,
+                                       thetahat_number spread);
+
+// The time update: one sample ahead. The functions of the transition must not call with this filter: that answers
+// BUSY. 2 n + 1 times f, and about 4 n^3 multiply-adds.
+//
+// Errors: NOT_FINITE if the next state of one of the points is NaN or infinite; OVERFLOW.
+thetahat_error thetahat_ukf_predict(thetahat_ukf *ukf,
+                                    const thetahat_function *transition);
+
+// The measurement update. A NaN in the measurement is a missing element: it is skipped alone, and the others are used.
+// The functions of the observation must not call with this filter: that answers BUSY. 2 n + 1 times h, and about m
+// (2 n^2 + 2 n m + 6 n) multiply-adds.
+//
+// - observation: h. Its Jacobian is not called, and may be NULL.
+// - measurement: y(k), m numbers.
+// - innovation: what was new; may be NULL.
+//
+// Errors: INFINITE; NOT_FINITE if h at one of the points is NaN or infinite; NO_VARIANCE; TOO_LARGE.
+thetahat_error thetahat_ukf_correct(thetahat_ukf *ukf,
+                                    const thetahat_function *observation,
+                                    const thetahat_number *measurement,
+                                    thetahat_innovation *innovation);
+
+// Reads the state, n numbers.
+thetahat_error thetahat_ukf_state(const thetahat_ukf *ukf, thetahat_number *state);
+
+// Reads P, the covariance of the error of the state as far as the points know it, n x n. n^3/6
+// multiply-adds.
+thetahat_error thetahat_ukf_covariance(const thetahat_ukf *ukf, thetahat_number *covariance);
 
 #ifdef __cplusplus
 }  // extern "C"

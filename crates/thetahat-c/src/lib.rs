@@ -8,6 +8,7 @@
 //! | `thetahat_arx` | recursive ARX and ARMAX estimators |
 //! | `thetahat_kalman` | the Kalman filter of a linear model |
 //! | `thetahat_ekf` | the extended Kalman filter of functions in C |
+//! | `thetahat_ukf` | the unscented Kalman filter of functions in C, without Jacobians |
 //! | `thetahat_luenberger` | the observer of a linear model |
 //! | `thetahat_detector` | charts that watch innovations |
 //! | `thetahat_rst` | a linear controller, and pole placement for it |
@@ -44,6 +45,7 @@ mod arx;
 mod detector;
 mod ekf;
 mod error;
+mod functions;
 mod innovation;
 mod kalman;
 mod learning;
@@ -57,11 +59,13 @@ mod rst;
 mod shapes;
 mod sizes;
 mod tuner;
+mod ukf;
 
 pub use arx::*;
 pub use detector::*;
 pub use ekf::*;
 pub use error::*;
+pub use functions::{Function, FunctionOfState};
 pub use innovation::*;
 pub use kalman::*;
 pub use learning::*;
@@ -71,6 +75,7 @@ pub use rls::*;
 pub use rst::*;
 pub use sizes::*;
 pub use tuner::*;
+pub use ukf::*;
 
 /// A number of the interface: `float`, or `double` where THETAHAT_DOUBLE is defined. It must be that of the library,
 /// whose feature `double` makes it `double`.

@@ -10,6 +10,7 @@ use crate::luenberger::LuenbergerSize;
 use crate::rls::RlsSize;
 use crate::rst::{RstPlaceSize, RstSize};
 use crate::tuner::TunerSize;
+use crate::ukf::UkfSize;
 
 #[unsafe(no_mangle)]
 pub static thetahat_rls_1: RlsSize = RlsSize::new::<1>();
@@ -151,6 +152,36 @@ pub static thetahat_ekf_6_1: EkfSize = EkfSize::new::<6, 1>();
 pub static thetahat_ekf_6_2: EkfSize = EkfSize::new::<6, 2>();
 #[unsafe(no_mangle)]
 pub static thetahat_ekf_6_3: EkfSize = EkfSize::new::<6, 3>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_1_1: UkfSize = UkfSize::new::<1, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_2_1: UkfSize = UkfSize::new::<2, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_2_2: UkfSize = UkfSize::new::<2, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_3_1: UkfSize = UkfSize::new::<3, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_3_2: UkfSize = UkfSize::new::<3, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_3_3: UkfSize = UkfSize::new::<3, 3>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_4_1: UkfSize = UkfSize::new::<4, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_4_2: UkfSize = UkfSize::new::<4, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_4_3: UkfSize = UkfSize::new::<4, 3>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_5_1: UkfSize = UkfSize::new::<5, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_5_2: UkfSize = UkfSize::new::<5, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_5_3: UkfSize = UkfSize::new::<5, 3>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_6_1: UkfSize = UkfSize::new::<6, 1>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_6_2: UkfSize = UkfSize::new::<6, 2>();
+#[unsafe(no_mangle)]
+pub static thetahat_ukf_6_3: UkfSize = UkfSize::new::<6, 3>();
 #[unsafe(no_mangle)]
 pub static thetahat_luenberger_1_1: LuenbergerSize = LuenbergerSize::new::<1, 1>();
 #[unsafe(no_mangle)]

@@ -363,6 +363,15 @@ fn what_is_set_while_it_runs_is_set_or_changes_nothing() {
         thetahat_ekf_state,
         thetahat_ekf_covariance
     );
+    check_filter!(
+        thetahat_ukf_init,
+        thetahat_ukf_2_1,
+        thetahat_ukf_set_state,
+        thetahat_ukf_set_covariance,
+        thetahat_ukf_widen,
+        thetahat_ukf_state,
+        thetahat_ukf_covariance
+    );
     let (mut memory, mut observer) = (Memory::new(), null_mut());
     let (start, zero) = (memory.start(), zeros.as_ptr());
     // SAFETY: pointers are null or valid.
@@ -464,6 +473,29 @@ fn functions_of_the_user_are_checked_and_must_not_call_back() {
         assert_eq!(thetahat_ekf_predict(ekf, &good), Error::None);
         assert_eq!(thetahat_ekf_set_iterations(ekf, 0), Error::OutOfRange);
     }
+}
+
+#[test]
+fn an_unscented_filter_needs_no_jacobian() {
+    let (mut memory, mut ukf, mut found) = (Memory::new(), null_mut(), [0.0; 4]);
+    let (start, size) = (memory.start(), &thetahat_ukf_2_1);
+    let model = Function { value: Some(identity), jacobian: None, context: null_mut() };
+    // SAFETY: pointers are null or valid, and the functions write what they must.
+    unsafe {
+        let code = thetahat_ukf_init(&raw mut ukf, start, Memory::BYTES, size, ONES.as_ptr(), null());
+        assert_eq!(code, Error::None);
+        assert_eq!(thetahat_ukf_set_noise(ukf, [1.0, 0.0, 0.0, 4.0].as_ptr(), ONES.as_ptr()), Error::None);
+        let before = memory.0;
+        let unknown = Function { value: Some(not_a_number), ..model };
+        assert_eq!(thetahat_ukf_predict(ukf, &unknown), Error::NotFinite);
+        assert_eq!(thetahat_ukf_correct(ukf, &unknown, ONES.as_ptr(), null_mut()), Error::NotFinite);
+        assert_eq!(thetahat_ukf_set_spread(ukf, 0.5), Error::OutOfRange);
+        assert!(memory.0 == before);
+        assert_eq!(thetahat_ukf_set_spread(ukf, 2.0), Error::None);
+        assert_eq!(thetahat_ukf_predict(ukf, &model), Error::None);
+        assert_eq!(thetahat_ukf_covariance(ukf, found.as_mut_ptr()), Error::None);
+    }
+    assert_eq!(found, [1.0, 0.0, 0.0, 4.0], "P = Q a step after a known state");
 }
 
 #[test]

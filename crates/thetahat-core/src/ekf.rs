@@ -194,7 +194,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         check_length("transition Jacobian", n, state_matrix.nrows())?;
         check_entries("transition Jacobian", state_matrix.as_slice(), n * n)?;
         noise.check("transition noise", n)?;
-        self.linear.propagate(next, &state_matrix, &noise.matrix(), &noise)?;
+        self.linear.propagate(transition, next, &state_matrix, &noise.matrix(), || &noise)?;
         Ok(state_matrix)
     }
 
@@ -235,22 +235,19 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
         N: Dimension<M>,
     {
         check_finite("input", input.as_slice())?;
-        let first = Linearised::at(self.linear.state(), observation, input, measurement)?;
-        if self.iterations == 1 {
-            return self
-                .linear
-                .absorb(first.rows, first.error, &first.noise, |h, v, s, e| record(0, h, v, s, e));
+        if self.iterations > 1 {
+            return self.iterate(observation, input, measurement, record);
         }
-        self.iterate(first, observation, input, measurement, record)
+        let Linearised { rows, error, noise } =
+            Linearised::at(self.linear.state(), observation, input, measurement)?;
+        self.linear.absorb(rows, error, &noise, |h, v, s, e| record(0, h, v, s, e))
     }
 
-    /// An iterated measurement update, from the linearisation about the prediction. (Apart from the other, so that this
-    /// one costs no step that does not iterate.)
+    /// An iterated measurement update. (Apart from the other, so that this one costs no step that does not iterate.)
     #[cold]
     #[inline(never)]
     fn iterate<M: Dimension + Dimension<N>, U: Dimension>(
         &mut self,
-        first: Linearised<T, N, M>,
         observation: &impl Observation<T, N, M, U>,
         input: &OVector<T, U>,
         measurement: &OVector<T, M>,
@@ -259,16 +256,22 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
     where
         N: Dimension<M>,
     {
-        let mut corrected = self.linear.clone();
-        let Linearised { rows, error, noise } = first.clone();
-        let innovation = corrected.absorb(rows, error, &noise, |h, v, s, e| record(0, h, v, s, e))?;
-        if !matches!(innovation.action, Action::Updated | Action::Released) {
-            self.linear = corrected;
-            return Ok(innovation);
-        }
-        let (ungated, checked) = (self.linear.clone().with_gate(T::INFINITY)?, corrected.clone());
-        let (mut linearised, mut state) = (first, self.linear.state().clone());
-        for iteration in 1..=self.iterations {
+        let (mut state, mut iteration) = (self.linear.state().clone(), 0);
+        // The innovation of the first linearisation, and the filter with the gate after it.
+        let mut first = None;
+        loop {
+            let linearised = Linearised::at(&state, observation, input, measurement)?;
+            let Linearised { rows, error, noise } = linearised.clone().seen_from(self.linear.state(), &state);
+            let mut corrected = self.linear.clone();
+            if iteration > 0 {
+                corrected.set_gate(T::INFINITY)?;
+            }
+            let told = corrected.absorb(rows, error, &noise, |h, v, s, e| record(iteration, h, v, s, e))?;
+            let (innovation, checked) = first.get_or_insert_with(|| (told, corrected.clone()));
+            if !matches!(innovation.action, Action::Updated | Action::Released) {
+                self.linear = corrected;
+                return Ok(innovation.clone());
+            }
             // `corrected` is where the whole step from `state` leads.
             let distance = |state: &OVector<T, N>, error: OVector<T, M>| {
                 let measured = squares(error, &linearised.noise, &innovation.variance);
@@ -276,7 +279,7 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
             };
             let before = distance(&state, linearised.error.clone());
             // Rounding of h counts divided by the deviation of the noise.
-            let rounding = T::EPSILON.sqrt() * (T::one() + before);
+            let rounding = T::SQRT_EPSILON * (T::one() + before);
             let mut step = corrected.state().clone();
             add_multiple(step.as_mut_slice(), -T::one(), state.as_slice());
             let mut fraction = T::one();
@@ -287,21 +290,19 @@ impl<T: Real, N: Dimension> ExtendedKalmanFilter<T, N> {
                 let error = prediction_error(measurement, observation.output(&next, input)).ok()?;
                 (distance(&next, error) < before + rounding).then_some(next)
             });
-            let Some(next) = found else { break };
-            let change = next.as_slice().iter().zip(state.as_slice());
-            let ended = change.into_iter().all(|(&next, &x)| (next - x).abs() <= T::EPSILON * x.abs());
-            state = next;
-            if ended || iteration == self.iterations {
-                break;
+            let mut ended = true;
+            if let Some(next) = found {
+                let mut change = next.as_slice().iter().zip(state.as_slice());
+                ended = change.all(|(&next, &x)| (next - x).abs() <= T::EPSILON * x.abs());
+                ud::copy(next.as_slice(), state.as_mut_slice());
             }
-            linearised = Linearised::at(&state, observation, input, measurement)?;
-            let Linearised { rows, error, noise } = linearised.clone().seen_from(self.linear.state(), &state);
-            corrected.clone_from(&ungated);
-            corrected.absorb(rows, error, &noise, |h, v, s, e| record(iteration, h, v, s, e))?;
+            iteration += 1;
+            if ended || iteration == self.iterations {
+                corrected.set_state(state)?;
+                self.linear = corrected.with_gate_of(checked);
+                return Ok(innovation.clone());
+            }
         }
-        corrected.set_state(state)?;
-        self.linear = corrected.with_gate_of(&checked);
-        Ok(innovation)
     }
 }
 

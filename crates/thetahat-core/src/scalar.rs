@@ -25,10 +25,14 @@ mod sealed {
 ///     values.iter().fold(T::zero(), |sum, &value| sum + value) / T::from_count(values.len())
 /// }
 /// assert_eq!(mean(&[1.0_f32, 2.0, 6.0]), 3.0);
+/// assert_eq!(<f32 as Real>::SQRT_EPSILON, f32::EPSILON.sqrt());
+/// assert_eq!(<f64 as Real>::SQRT_EPSILON, f64::EPSILON.sqrt());
 /// ```
 pub trait Real: RealField + Copy + sealed::Sealed {
     /// The distance from 1 to the next larger number.
     const EPSILON: Self;
+    /// Its square root, as a constant: a processor without an instruction for it takes 200 bytes of code.
+    const SQRT_EPSILON: Self;
     /// The smallest positive number of full precision. Its reciprocal is finite.
     const MIN_POSITIVE: Self;
     /// Not a number: a missing sample.
@@ -57,6 +61,7 @@ pub trait Real: RealField + Copy + sealed::Sealed {
 
 impl Real for f32 {
     const EPSILON: f32 = f32::EPSILON;
+    const SQRT_EPSILON: f32 = 3.452_669_8e-4;
     const MIN_POSITIVE: f32 = f32::MIN_POSITIVE;
     const NAN: f32 = f32::NAN;
     const INFINITY: f32 = f32::INFINITY;
@@ -81,6 +86,7 @@ impl Real for f32 {
 
 impl Real for f64 {
     const EPSILON: f64 = f64::EPSILON;
+    const SQRT_EPSILON: f64 = 1.0 / (1_u32 << 26) as f64;
     const MIN_POSITIVE: f64 = f64::MIN_POSITIVE;
     const NAN: f64 = f64::NAN;
     const INFINITY: f64 = f64::INFINITY;

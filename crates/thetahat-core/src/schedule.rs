@@ -101,7 +101,8 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
     {
         let state = self.filter.state().clone();
         check_length("transition", state.len(), transition.state_matrix().ncols())?;
-        self.filter.propagate(state, transition.state_matrix(), transition.noise_matrix(), transition.noise())
+        let (noise_matrix, noise) = (transition.noise_matrix(), transition.noise());
+        self.filter.propagate(transition, state, transition.state_matrix(), noise_matrix, || noise)
     }
 
     /// The measurement update: K, n x m.
@@ -211,7 +212,7 @@ impl<T: Real, N: Dimension> GainSchedule<T, N> {
             // amplified, for as long.
             let rounding = Covariance::<T, N>::rounding(size.value());
             let patience = if least_change <= rounding { least_at / 2 + 8 } else { least_at + 8 };
-            let stays = least_change <= T::EPSILON.sqrt() && steps - least_at > patience;
+            let stays = least_change <= T::SQRT_EPSILON && steps - least_at > patience;
             if change.is_zero() || stays {
                 let predicted = self.covariance().clone();
                 let gain = self.correct(observation)?;

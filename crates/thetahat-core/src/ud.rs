@@ -308,27 +308,33 @@ pub(crate) fn add_squares<T: Real>(factor: &[T], scale: T, k: usize, target: &mu
     *diagonal += weight;
 }
 
-/// Writes P into `matrix`, n³/3 multiply-adds. Each entry is added up where a compiler can keep it in a register, and
-/// written once: what is read back soon after it was written costs more than the arithmetic (measured).
+/// Writes P into `matrix`: the upper half column by column, then its mirror image. n³/6 multiply-adds; from four states
+/// on none for a column of U that is 0 above its diagonal.
 ///
 /// ```text
 /// P_ij = Σ over k >= j of D_k U_jk U_ik,   i <= j
 /// ```
 #[inline(always)]
 pub(crate) fn expand<T: Real>(factor: &[T], matrix: &mut [T], size: usize) {
-    for index in 0..size {
-        for row in 0..=index {
-            let weight = variance(factor, size, index);
-            let first = if row == index { weight } else { weight * entry(factor, size, row, index) };
-            let sum = (index + 1..size).fold(T::zero() + first, |sum, k| {
-                let weight = variance(factor, size, k) * entry(factor, size, index, k);
-                sum + weight * entry(factor, size, row, k)
-            });
-            if let Some(target) = matrix.get_mut(index * size + row) {
-                *target = sum;
+    matrix.fill(T::zero());
+    for k in 0..size {
+        let (weight, entries) = (variance(factor, size, k), above(factor, size, k));
+        // Up to three states, to look costs more than it saves.
+        if size <= 3 || !entries.iter().all(T::is_zero) {
+            for (index, &entry) in entries.iter().enumerate() {
+                add_multiple(upper_mut(matrix, size, index), weight * entry, entries);
             }
+            add_multiple(upper_mut(matrix, size, k), weight, entries);
+        }
+        if let Some(diagonal) = matrix.get_mut(k * size + k) {
+            *diagonal += weight;
+        }
+    }
+    for index in 1..size {
+        for row in 0..index {
+            let value = entry(matrix, size, row, index);
             if let Some(target) = matrix.get_mut(row * size + index) {
-                *target = sum;
+                *target = value;
             }
         }
     }

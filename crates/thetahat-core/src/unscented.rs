@@ -179,9 +179,20 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         let next = transition.next(state, input);
         check_entries("next state", next.as_slice(), state.len())?;
         noise.check("transition noise", state.len())?;
-        let Seen { mean, rows, noise } = self.seen(next, noise, "next state", &At(transition, input))?;
-        let state_matrix = transpose(&rows);
-        self.linear.propagate(mean, &state_matrix, &noise.matrix(), &noise)?;
+        let points = At(transition, input);
+        let (Seen { mean, rows, mut noise }, mut bends) = self.seen(next, noise, "next state", &points)?;
+        let (state_matrix, mut noise_matrix) = (transpose(&rows), noise.matrix());
+        let (n, weight) = (mean.len(), self.weight());
+        for index in 0..n {
+            let bend = column(bends.as_slice(), n, index);
+            for (k, &entry) in bend.iter().enumerate() {
+                add_multiple(column_mut(noise_matrix.as_mut_slice(), n, k), weight * entry, bend);
+            }
+        }
+        self.linear.propagate(&points, mean, &state_matrix, &noise_matrix, || {
+            add_bends(&mut noise, &mut bends, weight);
+            &noise
+        })?;
         Ok(state_matrix)
     }
 
@@ -256,7 +267,11 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         let output = observation.output(state, input);
         check_finite("predicted measurement", output.as_slice())?;
         noise.check("observation noise", output.len())?;
-        self.seen(output, noise, "predicted measurement", &Of(observation, input))
+        let (mut seen, mut bends) =
+            self.seen(output, noise, "predicted measurement", &Of(observation, input))?;
+        add_bends(&mut seen.noise, &mut bends, self.weight());
+        seen.noise.check("predicted measurement", seen.mean.len())?;
+        Ok(seen)
     }
 
     /// A function as the points see it, given its value at the centre and the noise that is added to it.
@@ -264,20 +279,20 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
     fn seen<R: Dimension + Dimension<N>>(
         &self,
         centre: OVector<T, R>,
-        mut noise: Covariance<T, R>,
+        noise: Covariance<T, R>,
         argument: &'static str,
         function: &impl Function<T, N, R>,
-    ) -> Result<Seen<T, N, R>, Error>
+    ) -> Result<Bent<T, N, R>, Error>
     where
         N: Dimension<R>,
     {
         let (state, factor) = (self.linear.state(), self.linear.covariance());
         let (size, n, outputs) = (factor.size(), state.len(), centre.len());
-        let square = self.spread * self.spread;
-        let (half, finest) = (nalgebra::convert::<f64, T>(0.5), T::EPSILON.sqrt());
-        let (mean_weight, weight) = (T::one() / square, (square - T::one()) / (square * square));
+        let (half, finest) = (nalgebra::convert::<f64, T>(0.5), T::SQRT_EPSILON);
+        let mean_weight = T::one() / (self.spread * self.spread);
         let mut rows = size.rows_by(noise.size(), T::zero());
-        let (mut mean, mut bend) = (centre.clone(), centre.clone());
+        let mut bends = noise.size().rows_by(size, T::zero());
+        let mut mean = centre.clone();
         for (index, x) in state.as_slice().iter().enumerate() {
             let deviation = ud::variance(factor.as_slice(), n, index).sqrt();
             let reach = deviation.max(finest * x.abs());
@@ -293,19 +308,20 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
                 check_entries(argument, value.as_slice(), outputs).map(|()| value)
             };
             let (ahead, behind) = (at(self.spread * reach)?, at(-self.spread * reach)?);
-            let (slope, share) = (half / (self.spread * reach), deviation / reach);
+            let slope = half / (self.spread * reach);
+            let share = if reach > deviation { deviation / reach } else { T::one() };
+            let bend = column_mut(bends.as_mut_slice(), outputs, index);
             let values = ahead.as_slice().iter().zip(behind.as_slice()).zip(centre.as_slice());
             for (output, ((&ahead, &behind), &centre)) in values.enumerate() {
                 // Differences first: where these are small beside the values, their sum keeps its digits.
                 if let Some(entry) = column_mut(rows.as_mut_slice(), n, output).get_mut(index) {
                     *entry = (ahead - behind) * slope;
                 }
-                if let Some(bend) = bend.as_mut_slice().get_mut(output) {
+                if let Some(bend) = bend.get_mut(output) {
                     *bend = ((ahead - centre) + (behind - centre)) * half * share * share;
                 }
             }
-            add_multiple(mean.as_mut_slice(), mean_weight, bend.as_slice());
-            ud::add_dyad(noise.as_mut_slice(), bend.as_mut_slice(), weight);
+            add_multiple(mean.as_mut_slice(), mean_weight, bend);
         }
         // So far each row h' is h'U: a column of U' h. U' is solved from above.
         for output in 0..outputs {
@@ -319,8 +335,14 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         }
         check_finite(argument, mean.as_slice())?;
         check_finite(argument, rows.as_slice())?;
-        noise.check(argument, outputs)?;
-        Ok(Seen { mean, rows, noise })
+        check_finite(argument, bends.as_slice())?;
+        Ok((Seen { mean, rows, noise }, bends))
+    }
+
+    /// (c² - 1)/c⁴, the weight of the bends in a covariance.
+    fn weight(&self) -> T {
+        let square = self.spread * self.spread;
+        (square - T::one()) / (square * square)
     }
 }
 
@@ -362,8 +384,23 @@ struct Seen<T: Real, N: Dimension<R>, R: Dimension> {
     mean: OVector<T, R>,
     /// The rows of G, as columns.
     rows: OMatrix<T, N, R>,
-    /// The noise that is added, and that of the bends.
+    /// The noise that is added.
     noise: Covariance<T, R>,
+}
+
+/// The same, and the bends apart, b_j in column j.
+type Bent<T, N, R> = (Seen<T, N, R>, OMatrix<T, R, N>);
+
+/// Adds the noise of the bends, which are columns and are used up. n times 2 m² multiply-adds and m divisions.
+fn add_bends<T: Real, N: Dimension, R: Dimension + Dimension<N>>(
+    noise: &mut Covariance<T, R>,
+    bends: &mut OMatrix<T, R, N>,
+    weight: T,
+) {
+    let outputs = bends.nrows();
+    for bend in bends.as_mut_slice().chunks_exact_mut(outputs.max(1)) {
+        ud::add_dyad(noise.as_mut_slice(), bend, weight);
+    }
 }
 
 #[cfg(feature = "serde")]

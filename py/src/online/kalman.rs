@@ -6,16 +6,17 @@ use pyo3::prelude::*;
 use thetahat_core::nalgebra::{Const, DMatrix, Dyn, OMatrix, OVector};
 use thetahat_core::{
     Action, Covariance, Dimension, Error, GainSchedule, Innovation as Told, KalmanFilter as Stepper,
-    LinearObservation as Observed, LinearTransition as Moved,
+    LinearObservation as Observed, LinearTransition as Moved, Smoother,
 };
 
 use super::argument::{self, Whole, failed};
+use super::around::smooth;
 use super::held::{Arguments, Held, predicted, renamed};
 use super::innovation::{Innovation, list};
 use super::model::{LinearObservation, LinearTransition};
 use super::trajectory::{
     FilterTrajectory, Record, Sample, Samples, Slices, SmoothedTrajectory, SteadyState, Steps, measurement,
-    recorded, returned, smooth, smoothed,
+    recorded, returned, smoothed,
 };
 use super::used::check_states;
 use super::{Reduced, Stop};
@@ -495,7 +496,7 @@ impl KalmanFilter {
         let slices = samples.slices()?;
         let filter = self.filter.clone();
         let result = py
-            .detach(|| smooth(filter.into(), transition, observation, &slices, |_| (), || false))
+            .detach(|| smooth(Smoother::new(filter), transition, observation, &slices, |_| (), || false))
             .map_err(|stop| stop.into_error(py))?;
         smoothed(py, result, samples.rows, n)
     }

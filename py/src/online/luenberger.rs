@@ -7,7 +7,7 @@ use thetahat_core::nalgebra::{Complex, DVector, Dyn};
 use thetahat_core::{LuenbergerObserver as Stepper, Observation, Transition};
 
 use super::argument::{self, check_size, failed, reserve, shaped};
-use super::extended::{explained, input};
+use super::around::{explained, input};
 use super::held::{Arguments, Held};
 use super::innovation::{self, Innovation, list};
 use super::trajectory::{ObserverTrajectory, Samples, Slices, measurement, returned};

@@ -3,10 +3,8 @@
 use numpy::{PyArray1, PyArray2, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use thetahat_core::nalgebra::{Const, DVector, Dyn, OVector};
-use thetahat_core::{
-    Covariance, Dimension, Error, ExtendedKalmanFilter, Innovation, Observation, Smoother, Transition,
-};
+use thetahat_core::nalgebra::{Const, DVector, OVector};
+use thetahat_core::{Covariance, Dimension, Error, Innovation};
 
 use super::argument::{self, Rows, reserve, shaped};
 use super::results::{Column, Results};
@@ -447,41 +445,6 @@ pub(crate) fn recorded<F>(
 
 /// Smoothed states, and their covariances, row by row.
 pub(crate) type Smoothed = (Vec<f64>, Vec<f64>);
-
-/// Smooths from where this filter stands. `before` is told of each estimate before a model is used.
-pub(crate) fn smooth<T: Transition<f64, Dyn, Dyn>, O: Observation<f64, Dyn, Dyn, Dyn>>(
-    filter: ExtendedKalmanFilter<f64, Dyn>,
-    transition: &T,
-    observation: &O,
-    samples: &Slices<'_>,
-    before: impl Fn(&Covariance<f64, Dyn>),
-    troubled: impl Fn() -> bool,
-) -> Result<Smoothed, Stop> {
-    let mut smoother = Smoother::new(filter);
-    let mut sample = samples.sample(Dyn(samples.outputs));
-    // The error gives way to what the function said.
-    let well = |row| if troubled() { Err((row, Error::Overflow)) } else { Ok(()) };
-    let mut pulse = Pulse::new(smoother.filter().state().len().pow(3));
-    for row in 0..samples.rows {
-        pulse.check()?;
-        if row > 0 {
-            before(smoother.filter().covariance());
-            smoother.predict(transition, &sample.inputs[0]).map_err(|error| (row - 1, error))?;
-            well(row - 1)?;
-        }
-        samples.read(row, &mut sample);
-        before(smoother.filter().covariance());
-        let corrected = smoother.correct(observation, &sample.inputs[1], &sample.measurement);
-        corrected.map_err(|error| (row, error))?;
-        well(row)?;
-    }
-    let (mut states, mut covariances) = (Vec::new(), Vec::new());
-    for smoothed in smoother.smooth().map_err(|error| (0, error))? {
-        states.extend_from_slice(smoothed.state.as_slice());
-        covariances.extend_from_slice(smoothed.covariance.as_slice());
-    }
-    Ok((states, covariances))
-}
 
 pub(crate) fn smoothed(
     py: Python<'_>,

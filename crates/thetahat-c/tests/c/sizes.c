@@ -48,6 +48,8 @@ static thetahat_error init_arx(size_t bytes, const thetahat_arx_size *size, uint
           thetahat_kalman_init(&kalman, memory, bytes, &thetahat_kalman_##n##_##m, numbers, NULL)); \
     CHECK("ekf " #n " " #m, THETAHAT_EKF_WORDS(n, m), \
           thetahat_ekf_init(&ekf, memory, bytes, &thetahat_ekf_##n##_##m, numbers, NULL)); \
+    CHECK("ukf " #n " " #m, THETAHAT_UKF_WORDS(n, m), \
+          thetahat_ukf_init(&ukf, memory, bytes, &thetahat_ukf_##n##_##m, numbers, NULL)); \
     CHECK("luenberger " #n " " #m, THETAHAT_LUENBERGER_WORDS(n, m), \
           thetahat_luenberger_init(&luenberger, memory, bytes, &thetahat_luenberger_##n##_##m, numbers, NULL))
 
@@ -82,6 +84,7 @@ int main(void) {
     thetahat_rls *rls;
     thetahat_kalman *kalman;
     thetahat_ekf *ekf;
+    thetahat_ukf *ukf;
     thetahat_luenberger *luenberger;
     thetahat_rst *rst;
     thetahat_detector *detector;

@@ -230,6 +230,34 @@ static void step_ekf(void) {
     }
 }
 
+static void step_ukf(void) {
+    static thetahat_word memory[THETAHAT_UKF_WORDS(2, 1)];
+    const thetahat_number prior[4] = {4, 1, 1, 2}, process_noise[4] = {(thetahat_number)0.25, 0, 0, (thetahat_number)0.5};
+    const thetahat_number noise[1] = {(thetahat_number)0.5};
+    thetahat_number u;
+    thetahat_function transition = {spring_next, NULL, NULL};
+    const thetahat_function observation = {gauge, NULL, NULL};
+    thetahat_ukf *ukf;
+    transition.context = &u;
+    done("ukf", thetahat_ukf_init(&ukf, memory, sizeof memory, &thetahat_ukf_2_1, zeros, prior));
+    done("ukf", thetahat_ukf_set_noise(ukf, process_noise, noise));
+    done("ukf", thetahat_ukf_set_spread(ukf, (thetahat_number)1.5));
+    for (int k = 0; k < SAMPLES; k++) {
+        thetahat_number state[2], covariance[4];
+        thetahat_innovation innovation;
+        u = record[k].u;
+        done("ukf", thetahat_ukf_correct(ukf, &observation, &record[k].y, &innovation));
+        done("ukf", thetahat_ukf_predict(ukf, &transition));
+        done("ukf", thetahat_ukf_state(ukf, state));
+        done("ukf", thetahat_ukf_covariance(ukf, covariance));
+        printf("ukf %d", k);
+        print_innovation(&innovation);
+        print_numbers(state, 2);
+        print_numbers(covariance, 4);
+        printf("\n");
+    }
+}
+
 static void step_luenberger(void) {
     static thetahat_word memory[THETAHAT_LUENBERGER_WORDS(2, 1)];
     const thetahat_number outputs[2] = {1, 0}, real[2] = {(thetahat_number)0.25, (thetahat_number)0.25};
@@ -319,6 +347,7 @@ int main(void) {
     step_arx("armax_warm", &thetahat_armax_5, 1, 1);
     step_kalman();
     step_ekf();
+    step_ukf();
     step_luenberger();
     step_rst();
     step_tuner("indirect", &thetahat_indirect_1_1, 3);

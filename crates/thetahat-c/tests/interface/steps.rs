@@ -110,6 +110,7 @@ pub(crate) fn lines<T: Number>() -> Result<String, Error> {
     })?;
     step_kalman(&mut lines)?;
     step_ekf(&mut lines)?;
+    step_ukf(&mut lines)?;
     step_luenberger(&mut lines)?;
     step_rst(&mut lines)?;
     step_indirect(&mut lines)?;
@@ -279,12 +280,17 @@ impl<T: Number> Observation<T, Const<2>, Const<1>, Const<1>> for Spring<T> {
     }
 }
 
-fn step_ekf<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+/// The spring with its noises, and the covariance of its first state.
+fn spring<T: Number>() -> Result<(Spring<T>, Covariance<T, Const<2>>), Error> {
     let spring = Spring {
         process_noise: Covariance::new(&Matrix2::new(0.25, 0.0, 0.0, 0.5).map(T::from))?,
         noise: Covariance::from_diagonal(&Vector1::new(T::from(0.5)))?,
     };
-    let prior = Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0).map(T::from))?;
+    Ok((spring, Covariance::new(&Matrix2::new(4.0, 1.0, 1.0, 2.0).map(T::from))?))
+}
+
+fn step_ekf<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+    let (spring, prior) = spring()?;
     let mut ekf = ExtendedKalmanFilter::new(Vector2::repeat(T::zero()), prior)?.with_iterations(2)?;
     for k in 0..SAMPLES {
         let (u, y) = lines.record[k];
@@ -292,6 +298,19 @@ fn step_ekf<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
         ekf.predict(&spring, &Vector1::new(u))?;
         let covariance = ekf.covariance().matrix();
         lines.line("ekf", k, Some(&innovation.into()), &[ekf.state().as_slice(), covariance.as_slice()]);
+    }
+    Ok(())
+}
+
+fn step_ukf<T: Number>(lines: &mut Lines<T>) -> Result<(), Error> {
+    let (spring, prior) = spring()?;
+    let mut ukf = UnscentedKalmanFilter::new(Vector2::repeat(T::zero()), prior)?.with_spread(T::from(1.5))?;
+    for k in 0..SAMPLES {
+        let (u, y) = lines.record[k];
+        let innovation = ukf.correct(&spring, &Vector1::new(u), &Vector1::new(y))?;
+        ukf.predict(&spring, &Vector1::new(u))?;
+        let covariance = ukf.covariance().matrix();
+        lines.line("ukf", k, Some(&innovation.into()), &[ukf.state().as_slice(), covariance.as_slice()]);
     }
     Ok(())
 }

@@ -310,9 +310,9 @@ class StateFilter:
 
     Noise of which the bound alone is known: the level is in its interval for certain, and the last row cannot be.
 
-    >>> text = "sample_time = 1\\noutputs = ['y']\\nstates = ['level']\\nF = [[1]]\\nH = [[1]]\\n"
-    >>> text += "process_bound = [0.1]\\nmeasurement_bound = [1]\\ninitial_bound = [100]\\n"
-    >>> level = th.StateFilter(th.StateModel.from_toml(text), "bounded").run([3.0, 4.0, 3.5, 9.0])
+    >>> bounds = {"process_bound": 0.1, "measurement_bound": 1, "initial_bound": 100}
+    >>> tank = th.StateModel([[1]], [[1]], **bounds, sample_time=1, states=["level"])
+    >>> level = th.StateFilter(tank, "bounded").run([3.0, 4.0, 3.5, 9.0])
     >>> level.to_pandas()[["contradicts", "level", "level_low", "level_high"]].round(2).values.tolist()[2:]
     [['', 3.55, 2.9, 4.2], ['y', 3.55, 2.8, 4.3]]
     """

@@ -36,11 +36,12 @@ class StateModel(Simulates):
         The state matrix.
     H : array_like, shape (m, n)
         The output matrix.
-    Q : array_like, shape (n, n)
-        The covariance of the process noise, added each sample.
-    R : array_like, shape (m, m)
+    Q : array_like, shape (n, n), optional
+        The covariance of the process noise, added each sample. It, ``R`` and ``P0`` are needed without bounds; where one is left
+        out beside its bound b, it is that of noise that is uniform within it: b²/3.
+    R : array_like, shape (m, m), optional
         The covariance of the measurement noise.
-    P0 : array_like, shape (n, n)
+    P0 : array_like, shape (n, n), optional
         The covariance of what is known of the state at the first row.
     sample_time : float or timedelta
         Time of a sample: seconds, or a timedelta.
@@ -52,6 +53,9 @@ class StateModel(Simulates):
         The covariance of the two noises: zero if not given.
     x0 : array_like, shape (n,), optional
         The state at the first row: zero if not given.
+    process_bound, measurement_bound, initial_bound : float, or array_like of shape (n,), (m,), (n,), optional
+        The largest magnitudes of the entries of w and v, and of x - x0 at the first row, for the estimator "bounded": all three or
+        none. A number is that of all entries.
     states, inputs, outputs : sequence of str, optional
         The names of the states, and the channels of the inputs and outputs: x1, x2, …; u, or u1, u2, …; y, or y1, y2, ….
 
@@ -67,6 +71,14 @@ class StateModel(Simulates):
     >>> nile = th.StateModel([[1]], [[1]], [[1469.1]], [[15099]], [[1e7]], sample_time=1, states=["level"])
     >>> nile
     StateModel(states level, no inputs, outputs y, sample time 1.0 s)
+
+    Noise of which the bound alone is known: the level is within 0.9 of 3.4 for certain.
+
+    >>> bounds = {"process_bound": 0.1, "measurement_bound": 1, "initial_bound": 100}
+    >>> tank = th.StateModel([[1]], [[1]], **bounds, sample_time=1)
+    >>> level = th.StateFilter(tank, "bounded").run([3.0, 4.0])
+    >>> level.filtered[-1].round(6).tolist(), level.filtered_bounds[-1].round(6).tolist()
+    ([3.55], [0.55])
     """
 
     __slots__ = ("_model", "_text")
@@ -77,15 +89,18 @@ class StateModel(Simulates):
         self,
         F: npt.ArrayLike,
         H: npt.ArrayLike,
-        Q: npt.ArrayLike,
-        R: npt.ArrayLike,
-        P0: npt.ArrayLike,
+        Q: npt.ArrayLike | None = None,
+        R: npt.ArrayLike | None = None,
+        P0: npt.ArrayLike | None = None,
         *,
         sample_time: Duration,
         G: npt.ArrayLike | None = None,
         D: npt.ArrayLike | None = None,
         S: npt.ArrayLike | None = None,
         x0: npt.ArrayLike | None = None,
+        process_bound: npt.ArrayLike | None = None,
+        measurement_bound: npt.ArrayLike | None = None,
+        initial_bound: npt.ArrayLike | None = None,
         states: Sequence[str] | None = None,
         inputs: Sequence[str] | None = None,
         outputs: Sequence[str] | None = None,
@@ -115,8 +130,15 @@ class StateModel(Simulates):
         for name, (value, rows, columns) in shapes.items():
             if value is not None:
                 lines.append(f"{name} = {_matrix(name, value, rows, columns).tolist()!r}")
-        if x0 is not None:
-            lines.append(f"x0 = {_matrix('x0', _numbers.column('x0', x0)[:, np.newaxis], size, 1)[:, 0].tolist()!r}")
+        vectors = {
+            "x0": (x0, size),
+            "process_bound": (_repeated(process_bound, size), size),
+            "measurement_bound": (_repeated(measurement_bound, measured), measured),
+            "initial_bound": (_repeated(initial_bound, size), size),
+        }
+        for name, (value, entries) in vectors.items():
+            if value is not None:
+                lines.append(f"{name} = {_matrix(name, _numbers.column(name, value)[:, np.newaxis], entries, 1)[:, 0].tolist()!r}")
         self._text = "\n".join(lines) + "\n"
         try:
             self._model = _thetahat.StateModel.from_toml(self._text)
@@ -216,6 +238,11 @@ def _matrix(name: str, value: npt.ArrayLike, rows: int | None, columns: int | No
     if not np.isfinite(found).all():
         raise ValueError(f"{name}: expected finite numbers, found {found[~np.isfinite(found)][0]}")
     return found
+
+
+def _repeated(bound: npt.ArrayLike | None, entries: int) -> npt.ArrayLike | None:
+    """A number as that of all entries."""
+    return [float(bound)] * entries if isinstance(bound, (int, float, np.generic)) else bound
 
 
 def _positive(name: str, value: Duration) -> float:

@@ -34,7 +34,7 @@ pub(crate) use design::DesignArguments;
 pub(crate) use each::EachArguments;
 pub(crate) use export::ExportArguments;
 pub(crate) use files::template_name;
-pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument};
+pub(crate) use filter::{EstimatorArgument, FilterArguments, FilterStartArgument, NoiseArgument};
 pub(crate) use fit::FitArguments;
 pub(crate) use inspect::InspectArguments;
 pub(crate) use lines::{LineArguments, LineFormatArgument};
@@ -206,8 +206,9 @@ A model in matrices, and one in equations:
 Equations have + - * / ^, sin cos tan asin acos atan atan2 sinh cosh tanh exp ln log10 sqrt abs sign min max, pi, t (seconds
 since the first row) and, in [next], dt (seconds of this step); limits sat(x, low, high) and dead zones dead(x, low, high);
 tables table(x; 0:1, 2:5, 3:6), by monotone cubics, and lines(x; 0:1, 2:5), by straight lines, held beyond the ends, whose
-values may be parameters; branches if a > b then c else d. 'within' makes a branch or a limit smooth over a width:
-if a > b within 0.1 then c else d, sat(x, 0, 1 within 0.1). The process noise grows with the square root of dt.")]
+values may be parameters; branches if a > b then c else d, with and, or, not between comparisons. 'within' makes a branch or a
+limit smooth over a width: if a > b within 0.1 then c else d, sat(x, 0, 1 within 0.1). The process noise grows with the
+square root of dt.")]
     Filter(Box<FilterArguments>),
     /// The frequency response of a fitted model
     ///

@@ -18,6 +18,7 @@ mod model;
 mod pieces;
 mod reduce;
 mod respond;
+mod response;
 mod search;
 mod spectrum;
 mod step;

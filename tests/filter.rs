@@ -584,3 +584,42 @@ fn the_unscented_and_the_iterated_filter() {
         }
     }
 }
+
+#[test]
+fn the_noises_of_the_nile() {
+    let folder = folder_with("nile.csv");
+    folder.write("nile.toml", NILE.replace("1469.1", "1000").replace("15099", "10000"));
+    let answer = folder.done("filter nile.toml log.csv --fit-noise -o fitted.toml");
+    assert!(answer.stdout.is_empty(), "{}", answer.stdout);
+    for words in ["100 values measured", "Q[level]", "R[y]"] {
+        assert!(answer.stderr.contains(words), "{words}: {}", answer.stderr);
+    }
+    // Durbin and Koopman, Time Series Analysis by State Space Methods, 2nd ed. 2012, section 2.10: 1469.1 and 15098.5.
+    let fitted = folder.read("fitted.toml");
+    let entry = |key: &str| -> f64 {
+        let line = fitted.lines().find_map(|line| line.strip_prefix(key)).expect(key);
+        line.trim_matches(['[', ']']).parse().expect("a number")
+    };
+    close(entry("Q = ") / 1469.1, 1.0, 2e-3);
+    close(entry("R = ") / 15098.5, 1.0, 5e-4);
+    let likelihood = |model: &str| number(&summary(&folder, &format!("{model} log.csv")), "/log_likelihood");
+    assert!(likelihood("fitted.toml") > likelihood("nile.toml"));
+    let written = folder.done("filter nile.toml log.csv --fit-noise=scaled --rows 1..50 --quiet");
+    assert!(written.stdout.starts_with("sample_time = 1.0\n") && written.stderr.is_empty());
+    for (line, code, words) in [
+        ("nile.toml log.csv --fit-noise --rows 1..2", 4, "need more than 2 measured values"),
+        ("nile.toml log.csv --fit-noise --rows 90..200", 3, "there are 100 rows"),
+    ] {
+        folder.assert_refused(&format!("filter {line}"), code, words);
+    }
+    // Of what does not go together more than a line is said.
+    for (more, words) in [
+        ("--smooth", "--smooth"),
+        ("--format csv", "--format"),
+        ("=all", "diagonal, full, scaled, innovations"),
+    ] {
+        let joined = if more.starts_with('=') { "" } else { " " };
+        let run = folder.run(&format!("filter nile.toml log.csv --fit-noise{joined}{more}"));
+        assert!(run.code == 2 && run.stdout.is_empty() && run.stderr.contains(words), "{}", run.stderr);
+    }
+}

@@ -33,6 +33,7 @@ mod flight_logs;
 mod floors;
 mod focus;
 mod forecast;
+mod frequency_fits;
 #[cfg(feature = "columnar")]
 mod fuzz;
 mod harness;

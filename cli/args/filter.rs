@@ -35,6 +35,30 @@ pub(crate) struct FilterArguments {
     /// Bounds of noises as so many standard deviations, for a model that says no bounds (bounded)
     #[arg(long, value_name = "K", allow_hyphen_values = true, help_heading = "Estimator")]
     pub(crate) deviations: Option<f64>,
+    /// Write the model, one in matrices, with the noises of which the log is most likely, instead of lines; they begin
+    /// at those of the model
+    #[arg(
+        long,
+        value_enum,
+        value_name = "STRUCTURE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "diagonal",
+        conflicts_with_all = [
+            "estimator",
+            "initial",
+            "measurement_noise",
+            "smooth",
+            "summary",
+            "every",
+            "format",
+            "deviations",
+            "poles",
+            "gain",
+        ],
+        help_heading = "Noises"
+    )]
+    pub(crate) fit_noise: Option<NoiseArgument>,
     /// The poles of the error of the observer in the z plane, such as 0.4+0.3i,0.4-0.3i
     #[arg(
         long,
@@ -62,6 +86,18 @@ pub(crate) struct FilterArguments {
     pub(crate) clock: LiveClockArguments,
     #[command(flatten)]
     pub(crate) log: LogArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum NoiseArgument {
+    /// The variances of Q and R
+    Diagonal,
+    /// All entries of Q and R
+    Full,
+    /// Two factors, of the Q and R of the model
+    Scaled,
+    /// R and K of w = K v
+    Innovations,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

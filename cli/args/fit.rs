@@ -14,21 +14,25 @@ pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input)
     #[arg(value_name = "LOG", required_unless_present_any = ["from", "list", "grey"])]
     pub(crate) logs: Vec<PathBuf>,
-    /// Fit a process to a frequency response instead of logs: the document that spectrum wrote (- for standard input);
-    /// with --structure or --np
+    /// Fit a process (--structure, --np) or equations (--grey) to a frequency response instead of logs: the document
+    /// that spectrum wrote (- for standard input), or a table of points in continuous time, such as an impedance
+    /// spectrum with columns of frequency in Hz and real and imaginary part, or magnitude and phase (--columns)
     #[arg(
         long,
         value_name = "RESPONSE",
         conflicts_with_all = ["logs", "each", "html", "ClockArguments", "LogArguments"]
     )]
     pub(crate) from: Option<PathBuf>,
+    /// The frequencies of the response that are fitted to, in rad/s [default: all]
+    #[arg(long, value_name = "LOW..HIGH", requires = "from", allow_hyphen_values = true)]
+    pub(crate) frequencies: Option<String>,
 
     #[command(flatten)]
     pub(crate) options: OptionArguments<FitOptions>,
     /// Fit the unknown parameters of a model in equations (TOML, see filter) by the largest likelihood; channels go by
     /// name, the clock may be irregular. template:NAME is a plant that is ready, with start values from the log:
     /// thetahat templates lists them
-    #[arg(long, value_name = "MODEL", help_heading = "Model", conflicts_with = "from")]
+    #[arg(long, value_name = "MODEL", help_heading = "Model")]
     pub(crate) grey: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) template: TemplateOptionArguments,

@@ -45,7 +45,8 @@ pub(crate) struct BodeArguments {
     /// The report that fit wrote (- for standard input); with --over several
     #[arg(value_name = "REPORT", required = true, num_args = 1..)]
     pub(crate) reports: Vec<PathBuf>,
-    /// Compare the models with a measured response, the JSON document of spectrum, at its frequencies
+    /// Compare the models with a measured response at its frequencies: the JSON document of spectrum, or a table of
+    /// points in continuous time, as fit takes it with --from
     #[arg(long, value_name = "FILE", conflicts_with_all = ["frequencies", "points"])]
     pub(crate) over: Option<PathBuf>,
     /// With --over: write a page with charts to a file too

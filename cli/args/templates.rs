@@ -9,7 +9,8 @@ use super::{ClockArguments, LogArguments, Names};
 /// What a template is told of a log.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TemplateOptionArguments {
-    /// Which column is which, of a template: ROLE=COLUMN, such as current=I_batt,voltage=U [default: by their names]
+    /// Which column is which, of a template: ROLE=COLUMN, such as current=I_batt,voltage=U; or of a table that --from
+    /// reads, with the roles hz, rad/s, re, im, -im, magnitude, db, phase (degrees) and sd [default: by their names]
     #[arg(long, value_name = "ROLE=COLUMN", help_heading = "Model")]
     pub(crate) columns: Vec<Names>,
     /// What is known of parameters, and of the numbers that a template takes as known: NAME=VALUE, such as

@@ -1,6 +1,7 @@
 //! `thetahat filter`: the state of a model along a log, or a pipe that someone is still writing to.
 
 mod columns;
+mod noises;
 
 use thetahat::Document;
 use thetahat::figures::fixed;
@@ -28,6 +29,9 @@ pub(crate) fn filter(arguments: &FilterArguments) -> Result<(), Failure> {
         [] => model,
         deviations => model.with_measurement_noise(deviations).map_err(|error| Failure::option(&error))?,
     };
+    if let Some(structure) = job.noise_structure {
+        return noises::fit_noise(&job, &model, structure);
+    }
     let estimator = job.estimator(&model);
     let filter = StateFilter::new(model, estimator).map_err(|error| match &error {
         thetahat::Error::Argument { argument, message } if argument == "start" => {

@@ -13,10 +13,10 @@ use thetahat::report::{Report, Validated, ValidationPlan, held_out_runs, validat
 use super::each::{Done, each};
 use super::experiments::{Experiments, experiments};
 use super::search::{Identified, Telling};
-use super::{pieces, stored, templates};
+use super::{pieces, response, stored, templates};
 use crate::args::{EachArguments, FitArguments, FormatArgument, template_name};
 use crate::failure::Failure;
-use crate::job::{Equations, FitJob};
+use crate::job::{Equations, FitJob, TemplateOptions};
 use crate::log::{self, Clocks, Joined};
 use crate::messages::warn;
 use crate::output;
@@ -58,9 +58,20 @@ fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
         return pieces::found(job, telling);
     }
     if let Some(path) = &job.response {
-        let response = stored::response(path)?;
         let draft = job.draft()?;
-        let report = telling.watched(|monitor| draft.fit_response(&response, monitor))?;
+        let equations = match &job.equations {
+            Some(Equations::File(path)) => Some(of_text(path, &job.template)?),
+            _ => None,
+        };
+        let response = response::read(path, &job.template.columns, channels(job, equations.as_ref()))?;
+        let response = match job.band {
+            Some([low, high]) => response.within(low, high).map_err(|error| Failure::option(&error))?,
+            None => response,
+        };
+        let report = telling.watched(|monitor| match &equations {
+            Some(model) => draft.fit_equations_to_response(model, &response, monitor),
+            None => draft.fit_response(&response, monitor),
+        })?;
         let report = report.map_err(log::failure(&response.logs))?;
         return Ok(Identified { report, log: None, sources: Vec::new() });
     }
@@ -79,18 +90,36 @@ fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
     Ok(Identified { report: report.map_err(log::failure(&sources))?, log: kept, sources })
 }
 
+/// A model in equations that is in a file, with what is known of its parameters.
+fn of_text(path: &Path, options: &TemplateOptions) -> Result<GreyBox, Failure> {
+    let known: Vec<(&str, f64)> = options.known.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+    let model = GreyBox::from_toml(&stored::text(path)?)
+        .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
+    model
+        .with_parameters(&known)
+        .map_err(|error| Failure::usage(format!("--known: {}: {error}", path.display())))
+}
+
+/// What input and output of a table are called: as the options say, else as the equations do if they have one of each.
+fn channels<'j>(job: &'j FitJob, equations: Option<&'j GreyBox>) -> [&'j str; 2] {
+    let own = |channels: &'j [String]| match channels {
+        [only] => Some(only.as_str()),
+        _ => None,
+    };
+    let input = job.options.input.first().map(|name| name.0.as_str());
+    let output = job.options.output.first().map(|name| name.0.as_str());
+    [
+        input.or_else(|| own(equations?.inputs())).unwrap_or("u"),
+        output.or_else(|| own(equations?.outputs())).unwrap_or("y"),
+    ]
+}
+
 /// Reads the logs and fits the unknown parameters of a model in equations.
 fn equations(job: &FitJob, from: &Equations, telling: &Telling) -> Result<Identified, Failure> {
     let draft = job.draft()?;
-    let known: Vec<(&str, f64)> =
-        job.template.known.iter().map(|(name, value)| (name.as_str(), *value)).collect();
     let (model, Joined { log, sources, warnings }) = match from {
         Equations::File(path) => {
-            let model = GreyBox::from_toml(&stored::text(path)?)
-                .map_err(|error| Failure::data(format!("{}: {error}", path.display())))?;
-            let model = model
-                .with_parameters(&known)
-                .map_err(|error| Failure::usage(format!("--known: {}: {error}", path.display())))?;
+            let model = of_text(path, &job.template)?;
             let joined = log::joined(&job.paths, &job.log, Clocks::from(&model), |_, _| {
                 Ok(model.inputs().iter().chain(model.outputs()).cloned().collect())
             })?;

@@ -1,9 +1,5 @@
 //! `thetahat step`: what a log of steps shows, and what a stored model does after a step.
 
-use std::fs::File;
-use std::io::{self, BufRead, Read};
-use std::path::Path;
-
 use thetahat::data::Log;
 use thetahat::present::{step_test_page, tables};
 use thetahat::spectrum::MeasuredResponse;
@@ -18,13 +14,8 @@ use crate::job::StepTestJob;
 use crate::wrap::layout_of;
 use crate::{log, output};
 
-/// The first bytes of a file say what it is.
-const HEAD: u64 = 4096;
-/// UTF-8 may begin with it.
-const MARK: &[u8] = b"\xef\xbb\xbf";
-
 pub(crate) fn step(arguments: &StepArguments, line: &str) -> Result<(), Failure> {
-    if !is_json(&arguments.path)? {
+    if !stored::is_json(&arguments.path)? {
         let (found, log) = tested(&StepTestJob::resolve(arguments)?)?;
         return written(arguments, &found, Some(&log), line);
     }
@@ -54,27 +45,6 @@ pub(crate) fn step(arguments: &StepArguments, line: &str) -> Result<(), Failure>
     let model = stored::report_of(path, &text)?.model;
     let samples = arguments.samples.map(|samples| samples as usize);
     transient::respond(&what, path, &model, samples, &arguments.out, arguments.html.as_deref(), line)
-}
-
-/// Whether a file is JSON: whether the first that is not blank is {. What comes on standard input is not used up. A
-/// pipe that has a name cannot be read twice: it is taken for a document.
-fn is_json(path: &Path) -> Result<bool, Failure> {
-    let failed = |error| Failure::io(path, "cannot be read", &error);
-    let begins = |head: &[u8]| {
-        let head = head.strip_prefix(MARK).unwrap_or(head);
-        head.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'{')
-    };
-    if path == Path::new("-") {
-        return Ok(begins(io::stdin().lock().fill_buf().map_err(failed)?));
-    }
-    let file = File::open(path).map_err(failed)?;
-    let metadata = file.metadata().map_err(failed)?;
-    if !(metadata.is_file() || metadata.is_dir()) {
-        return Ok(true);
-    }
-    let mut head = Vec::new();
-    file.take(HEAD).read_to_end(&mut head).map_err(failed)?;
-    Ok(begins(&head))
 }
 
 /// Reads the log and evaluates its steps.

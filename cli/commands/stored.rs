@@ -1,7 +1,7 @@
 //! What `fit` wrote, read back.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufRead, Read};
 use std::path::Path;
 
 use serde_json::Value;
@@ -16,6 +16,10 @@ use crate::failure::{Failure, Kind};
 
 /// A report has this many bytes at most: beyond it the file is something else.
 const LARGEST_REPORT: u64 = 1 << 30;
+/// The first bytes of a file say what it is.
+const HEAD: u64 = 4096;
+/// UTF-8 may begin with it.
+const MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// The model of a stored report.
 pub(super) fn model(path: &Path) -> Result<Model, Failure> {
@@ -95,4 +99,25 @@ pub(super) fn text(path: &Path) -> Result<String, Failure> {
         File::open(path).map_err(failed)?.take(LARGEST_REPORT).read_to_end(&mut bytes).map_err(failed)?;
     }
     String::from_utf8(bytes).map_err(|_| Failure::data(format!("{}: this is not UTF-8 text", path.display())))
+}
+
+/// Whether a file is JSON: whether the first that is not blank is {. What comes on standard input is not used up. A
+/// pipe that has a name cannot be read twice: it is taken for a document.
+pub(super) fn is_json(path: &Path) -> Result<bool, Failure> {
+    let failed = |error| Failure::io(path, "cannot be read", &error);
+    let begins = |head: &[u8]| {
+        let head = head.strip_prefix(MARK).unwrap_or(head);
+        head.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'{')
+    };
+    if path == Path::new("-") {
+        return Ok(begins(io::stdin().lock().fill_buf().map_err(failed)?));
+    }
+    let file = File::open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    if !(metadata.is_file() || metadata.is_dir()) {
+        return Ok(true);
+    }
+    let mut head = Vec::new();
+    file.take(HEAD).read_to_end(&mut head).map_err(failed)?;
+    Ok(begins(&head))
 }

@@ -1,10 +1,11 @@
 use std::path::{Path, PathBuf};
 
 use thetahat::data::Rows;
+use thetahat::estimate::NoiseStructure;
 use thetahat::filter::{Estimator, InitialState, ObserverGain, StateModel};
 
 use super::{LineJob, LogJob, parsed, pole};
-use crate::args::{EstimatorArgument, FilterArguments, FilterStartArgument};
+use crate::args::{EstimatorArgument, FilterArguments, FilterStartArgument, NoiseArgument};
 use crate::failure::Failure;
 
 /// A state to estimate.
@@ -23,6 +24,8 @@ pub(crate) struct FilterJob {
     pub(crate) smooth: bool,
     pub(crate) lines: LineJob,
     pub(crate) summary: Option<PathBuf>,
+    /// What is unknown of the noises, if they are to be found.
+    pub(crate) noise_structure: Option<NoiseStructure>,
     estimator: Option<Estimator>,
 }
 
@@ -84,6 +87,12 @@ impl FilterJob {
             smooth: arguments.smooth,
             lines: LineJob::resolve(&arguments.lines),
             summary: arguments.lines.summary.clone(),
+            noise_structure: arguments.fit_noise.map(|structure| match structure {
+                NoiseArgument::Diagonal => NoiseStructure::Diagonal,
+                NoiseArgument::Full => NoiseStructure::Full,
+                NoiseArgument::Scaled => NoiseStructure::Scaled,
+                NoiseArgument::Innovations => NoiseStructure::Innovations,
+            }),
             estimator,
         })
     }

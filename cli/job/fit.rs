@@ -29,8 +29,10 @@ pub(crate) struct FitJob {
     pub(crate) equations: Option<Equations>,
     /// What is known of its parameters, and which column is which.
     pub(crate) template: TemplateOptions,
-    /// The document of a frequency response.
+    /// A frequency response: a document, or a table.
     pub(crate) response: Option<PathBuf>,
+    /// From which to which of its frequencies, in rad/s.
+    pub(crate) band: Option<[f64; 2]>,
     /// Whether the logs are read part by part.
     pub(crate) in_pieces: bool,
     /// Whether the log is wanted afterwards.
@@ -55,23 +57,29 @@ impl FitJob {
             (None, Some(_)) => Fitted::Response,
             (None, None) => Fitted::Log { several_outputs: false },
         };
-        let files = arguments.logs.iter().chain(&arguments.grey).chain(&arguments.plan);
+        let files =
+            arguments.logs.iter().chain(&arguments.grey).chain(&arguments.plan).chain(&arguments.from);
         if files.filter(|path| *path == Path::new("-")).count() > 1 {
-            let what = if arguments.grey.is_some() { "the model and the logs" } else { "the logs" };
+            let what = match (&arguments.grey, &arguments.from) {
+                (Some(_), Some(_)) => "the model and the response",
+                (Some(_), None) => "the model and the logs",
+                (None, Some(_)) => "the response and the plan",
+                (None, None) => "the logs",
+            };
             return Err(Failure::usage(format!("only one of {what} can come from standard input (-)")));
         }
         let template = TemplateOptions::resolve(&arguments.template)?;
         let equations = match arguments.grey.as_deref().map(|path| (path, template_name(path))) {
             None => {
-                let given =
-                    [("--columns", template.columns.is_empty()), ("--known", template.known.is_empty())];
-                if let Some((option, _)) = given.iter().find(|(_, is_empty)| !is_empty) {
+                let columns_are_named = !template.columns.is_empty() && arguments.from.is_none();
+                let given = [("--columns", columns_are_named), ("--known", !template.known.is_empty())];
+                if let Some((option, _)) = given.iter().find(|(_, is_given)| *is_given) {
                     return Err(Failure::usage(format!("{option} goes with --grey, a model in equations")));
                 }
                 None
             }
             Some((path, None)) => {
-                if !template.columns.is_empty() {
+                if !template.columns.is_empty() && arguments.from.is_none() {
                     let message = "--columns is for templates; a model in a text names its channels itself";
                     return Err(Failure::usage(message));
                 }
@@ -79,6 +87,12 @@ impl FitJob {
             }
             Some((_, Some(name))) => {
                 let template = Template::named(name).map_err(|error| Failure::option(&error))?;
+                if arguments.from.is_some() {
+                    return Err(Failure::usage(
+                        "--from: a template finds its start values in a log; write its model of one to a file (thetahat templates NAME \
+                         LOG), and give that",
+                    ));
+                }
                 if arguments.logs.is_empty() {
                     let (name, wants) = (template.name, template.wants());
                     return Err(Failure::usage(format!(
@@ -97,6 +111,7 @@ impl FitJob {
             equations,
             template,
             response: arguments.from.clone(),
+            band: arguments.frequencies.as_deref().map(band).transpose()?,
             in_pieces: arguments.stream,
             keeps_log: arguments.html.is_some(),
             options,
@@ -111,5 +126,18 @@ impl FitJob {
     /// The fit before the log says what its channels are.
     pub(crate) fn draft(&self) -> Result<FitDraft, Failure> {
         FitDraft::new(&self.options, self.fitted).map_err(|error| Failure::option(&error))
+    }
+}
+
+/// The two ends of a band.
+fn band(text: &str) -> Result<[f64; 2], Failure> {
+    let number =
+        |text: &str| text.trim().parse::<f64>().ok().filter(|value| *value >= 0.0 && value.is_finite());
+    let ends = text.split_once("..").and_then(|(low, high)| number(low).zip(number(high)));
+    match ends {
+        Some((low, high)) if low < high => Ok([low, high]),
+        _ => Err(Failure::usage(format!(
+            "--frequencies {text}: write a band as LOW..HIGH, in rad/s, such as 0.1..100"
+        ))),
     }
 }

@@ -9,7 +9,7 @@ use thetahat::data::Rows;
 use thetahat::inspect::{Inspection, InspectionPlan};
 use thetahat::present::tables;
 use thetahat::report::{Report, Requirement, Validated, ValidationPlan};
-use thetahat::spectrum::{MeasuredResponse, SpectrumPlan};
+use thetahat::spectrum::{GivenPoint, MeasuredResponse, SpectrumPlan};
 use thetahat::step_test::{StepTest, StepTestPlan};
 use thetahat::{Document, is_document};
 
@@ -168,8 +168,12 @@ pub(crate) fn spectrum(py: Python<'_>, log: &Bound<'_, Log>, plan: &str) -> PyRe
         .map_err(|error| error::batch(py, error))?;
     let (log, sources) = (Arc::clone(&log.log), log.sources.clone());
     let found = interruptible(py, move |_| thetahat::spectrum::spectrum(&log, &sources, &plan))?;
+    response_document(py, &found)
+}
+
+fn response_document(py: Python<'_>, found: &MeasuredResponse) -> PyResult<(String, String)> {
     let json = found.to_json().map_err(|error| error::batch(py, error))?;
-    Ok((json, tables::response(&found, error::layout())))
+    Ok((json, tables::response(found, error::layout())))
 }
 
 /// What the steps of some rows of a log show: the document that `thetahat step` writes, and its table.
@@ -196,7 +200,45 @@ pub(crate) fn step_test(
     step_document(py, &found)
 }
 
-/// The same of the document of a measured response, at the phase of -45 degrees.
+/// The document and the table of a response whose points were measured elsewhere: frequencies in rad/s, real and
+/// imaginary parts, and standard deviations if they are known.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "the columns of a table, and what they are of")]
+pub(crate) fn given_response(
+    py: Python<'_>,
+    input: &str,
+    output: &str,
+    frequencies: Vec<f64>,
+    re: Vec<f64>,
+    im: Vec<f64>,
+    deviations: Option<Vec<f64>>,
+    held: Option<f64>,
+) -> PyResult<(String, String)> {
+    let point = |(row, ((frequency, re), im)): (usize, ((f64, f64), f64))| GivenPoint {
+        frequency,
+        re,
+        im,
+        standard_deviation: deviations.as_ref().and_then(|all| all.get(row)).copied(),
+    };
+    let points: Vec<GivenPoint> = frequencies.into_iter().zip(re).zip(im).enumerate().map(point).collect();
+    let found =
+        MeasuredResponse::given(input, output, &points, held).map_err(|error| error::batch(py, error))?;
+    response_document(py, &found)
+}
+
+/// The same of the points of one that is there, from one frequency to another.
+#[pyfunction]
+pub(crate) fn response_within(
+    py: Python<'_>,
+    response: &str,
+    low: f64,
+    high: f64,
+) -> PyResult<(String, String)> {
+    let found = MeasuredResponse::from_json(response).and_then(|response| response.within(low, high));
+    response_document(py, &found.map_err(|error| error::batch(py, error))?)
+}
+
+/// The step test of the document of a measured response, at the phase of -45 degrees.
 #[pyfunction]
 pub(crate) fn sine_test(py: Python<'_>, response: &str, input: &str) -> PyResult<(String, String)> {
     let found = MeasuredResponse::from_json(response)

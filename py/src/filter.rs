@@ -21,7 +21,7 @@ use crate::work::Pulse;
 /// A model with a state: the text of one with matrices or equations, or that of a report.
 #[pyclass(frozen, module = "thetahat._thetahat")]
 pub(crate) struct StateModel {
-    model: thetahat::filter::StateModel,
+    pub(crate) model: thetahat::filter::StateModel,
 }
 
 #[pymethods]

@@ -80,6 +80,22 @@ pub(crate) fn fit_equations(
     Ok(Model::of(report))
 }
 
+/// The same to the document of a frequency response.
+#[pyfunction]
+pub(crate) fn fit_equations_to_response(
+    py: Python<'_>,
+    response: &str,
+    model: &Bound<'_, GreyBox>,
+    plan: &str,
+) -> PyResult<Model> {
+    let draft = draft(py, plan, Fitted::Equations)?;
+    let response = MeasuredResponse::from_json(response).map_err(|error| error::batch(py, error))?;
+    let model = model.get().0.clone();
+    let report =
+        interruptible(py, move |monitor| draft.fit_equations_to_response(&model, &response, monitor))?;
+    Ok(Model::of(report))
+}
+
 /// Fits a process to the document of a frequency response with options of a fit, a plan in JSON.
 #[pyfunction]
 pub(crate) fn fit_response(py: Python<'_>, response: &str, plan: &str) -> PyResult<Model> {

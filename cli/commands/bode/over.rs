@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use thetahat::model::{LinearModel, Model};
+use thetahat::model::{LinearModel, Model, Signal};
 use thetahat::present::response_page;
 use thetahat::respond::{FrequencyPoint, FrequencyResponse};
 use thetahat::spectrum::MeasuredResponse;
 
 use crate::args::BodeArguments;
-use crate::commands::stored;
+use crate::commands::{response, stored};
 use crate::failure::Failure;
 use crate::messages::warn;
 use crate::output;
@@ -21,12 +21,19 @@ pub(super) fn over(arguments: &BodeArguments, path: &Path, line: &str) -> Result
             "only one of the reports and the response can come from standard input (-)",
         ));
     }
-    let found = stored::response(path)?;
     let stored: Vec<(&Path, Model)> = arguments
         .reports
         .iter()
         .map(|report| Ok((report.as_path(), stored::model(report)?)))
         .collect::<Result<_, Failure>>()?;
+    // A table of points has no names of channels: those of the first model serve.
+    let name = |signals: &[Signal], otherwise: &str| {
+        signals.first().map_or(otherwise.to_owned(), |own| own.name.clone())
+    };
+    let [input, output] = stored.first().map_or(["u".to_owned(), "y".to_owned()], |(_, model)| {
+        [name(model.inputs(), "u"), name(model.outputs(), "y")]
+    });
+    let found = response::read(path, &[], [&input, &output])?;
     let mut models = Vec::new();
     for (report, model) in &stored {
         models.push((report.display().to_string(), of_output(report, model, &found)?));

@@ -17,6 +17,7 @@
 //!   [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`] (of
 //!   [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or
 //!   [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
+//! - [`NoiseStructure`] says what is unknown of the noises of a model in matrices.
 //! - [`Criteria`] are the values of each [`InformationCriterion`].
 //!
 //! The methods and their sources are at [`Method`]; the theory is that of Ljung, System Identification, 2nd ed. 1999,
@@ -49,6 +50,7 @@ mod initial;
 mod instrumental;
 mod minimax;
 mod noise_integrator;
+pub(crate) mod noises;
 pub(crate) mod nonlinear_arx;
 mod offset;
 mod outcome;
@@ -95,6 +97,7 @@ pub(crate) use experiment_data::ExperimentData;
 pub use impulse_response::{Kernel, KernelParameters, RegularisedOutcome};
 pub use initial::Initial;
 pub(crate) use noise_integrator::with_noise_integrator;
+pub use noises::NoiseStructure;
 pub use nonlinear_arx::{MapsOutcome, RunFigures, TermStep, TermsOutcome, TrainingOutcome};
 pub use offset::Constant;
 pub(crate) use offset::{Beside, Fitted, LinearProblem, OutputOffset, Task, pays};

@@ -7,6 +7,7 @@
 //!   [`StateValues`].
 //! - [`SmoothedStates`] are those given all rows, [`FilterSnapshot`] is a filter that is stored to go on later,
 //!   [`FilterSummary`] is the document of a run, with an [`EstimatedNumber`] for each unknown parameter.
+//! - [`StateModel::fit_noise`] finds the noises of a model in matrices from some [`NoiseLog`]s: a [`NoiseEstimate`].
 //!
 //! The filters, with equations and sources, are in [`thetahat_core`].
 //!
@@ -39,6 +40,7 @@ mod linear;
 mod linearization;
 mod matrices;
 mod model;
+mod noises;
 mod past;
 mod row;
 mod smooth;
@@ -53,6 +55,7 @@ pub use estimate::{StateEstimate, StateValues};
 pub use estimator::{Estimator, ObserverGain};
 pub use frame::InitialState;
 pub use model::StateModel;
+pub use noises::{NoiseEstimate, NoiseLog};
 pub use smooth::SmoothedStates;
 pub use snapshot::FilterSnapshot;
 pub use step::StateFilter;

@@ -25,7 +25,7 @@ use crate::options::{ColumnName, Kind};
 use crate::plan::{FitOptions, Fitted};
 use crate::report::{
     EquationsPlan, NormalEquations, PendingEvaluation, Plan, ProcessPlan, Report, fit_equations,
-    fit_process_to_response,
+    fit_equations_to_response, fit_process_to_response,
 };
 use crate::spectrum::MeasuredResponse;
 use arima::ArimaDraft;
@@ -228,6 +228,20 @@ impl FitDraft {
         Ok(Report { plan: Some(self.options.clone()), ..report })
     }
 
+    /// The same to a frequency response.
+    ///
+    /// # Errors
+    /// As for [`fit_equations_to_response`]; [`Error::Argument`] for options of another kind of model.
+    pub fn fit_equations_to_response(
+        &self,
+        model: &GreyBox,
+        response: &MeasuredResponse,
+        monitor: Monitor<'_>,
+    ) -> Result<Report, Error> {
+        let report = fit_equations_to_response(model, response, self.equations_plan()?, monitor)?;
+        Ok(Report { plan: Some(self.options.clone()), ..report })
+    }
+
     /// What is asked of a fit of equations.
     ///
     /// # Errors
@@ -245,6 +259,10 @@ impl FitDraft {
         let Some(plan) = self.draft.of_response() else {
             return Err(Error::argument("from", "the options ask for another kind of model than a process"));
         };
+        if let Some(other) = self.options.output.iter().find(|output| output.0 != response.output) {
+            let message = format!("the response is of '{}', not of '{}'", response.output, other.0);
+            return Err(Error::argument("output", message));
+        }
         let report = fit_process_to_response(response, plan, monitor)?;
         Ok(Report { plan: Some(self.options), ..report })
     }

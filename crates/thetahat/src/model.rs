@@ -39,6 +39,7 @@ mod orders;
 pub(crate) mod polynomial;
 mod process;
 mod quantity;
+mod resolvent;
 mod state_space;
 
 pub use arima::ArimaOrders;
@@ -64,6 +65,7 @@ pub use orders::{Orders, Structure};
 pub(crate) use process::{Chain, Columns, MOST_POLES, Parts, State, Transition};
 pub use process::{ProcessModel, ProcessStructure};
 pub use quantity::{Interval, Quantity, Root};
+pub(crate) use resolvent::{Complex, resolved};
 pub use state_space::{
     ContinuousStateSpace, ContinuousStateSpaceModel, Entry, EntryCovariance, Hold, Reduced, StateSpace,
     StateSpaceMatrix, StateSpaceModel, ZerosPolesGain,

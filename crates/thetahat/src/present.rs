@@ -61,7 +61,7 @@ pub use self::{
 pub mod tables {
     pub use super::control::control;
     pub use super::design::{experiment_design, test_signal};
-    pub use super::filtered::filtered;
+    pub use super::filtered::{filtered, noises};
     pub use super::fit::{converted, report};
     pub use super::fits::figure;
     pub use super::inspection::inspection;

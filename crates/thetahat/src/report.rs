@@ -61,6 +61,7 @@ mod process;
 mod purpose;
 mod reduce;
 mod requirement;
+mod response;
 mod row;
 mod sample;
 mod schema;
@@ -75,7 +76,9 @@ mod warnings;
 
 pub use apply::{Applied, AppliedOutput, apply};
 pub use arima::{ArimaPlan, fit_arima};
-pub use equations::{EquationsPlan, answer_equations, fit_equations, fit_equations_distributed};
+pub use equations::{
+    EquationsPlan, answer_equations, fit_equations, fit_equations_distributed, fit_equations_to_response,
+};
 pub use experiments::Experiments;
 pub use held_out_runs::held_out_runs;
 pub use identify::{identify, identify_monitored};

@@ -36,6 +36,7 @@
 
 pub(crate) mod arima;
 mod continuous;
+mod correlation;
 mod draws;
 pub(crate) mod equations;
 mod forecast;
@@ -62,6 +63,7 @@ mod tested;
 mod tests;
 mod transient;
 
+pub(crate) use correlation::Correlation;
 pub(crate) use draws::Spread;
 pub use draws::{Drawn, Draws, draw};
 pub use forecast::{Forecast, forecast};

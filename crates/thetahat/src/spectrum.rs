@@ -3,7 +3,8 @@
 //! - [`spectrum()`] estimates the response of a [`Log`](crate::data::Log) from its inputs to its output, as a
 //!   [`SpectrumPlan`] says: by a [`Method`] ([`Estimator`]) at some [`Frequencies`].
 //! - [`MeasuredResponse`] is the document: points with covariance, noise and coherence ([`NoisePoint`]), and whether
-//!   the bands are honest ([`BandQuality`]). It can be compared with a model ([`Agreement`]).
+//!   the bands are honest ([`BandQuality`]). It can be compared with a model ([`Agreement`]). Its points may have been
+//!   measured elsewhere, too ([`GivenPoint`]).
 //!
 //! ```
 //! use thetahat::data::{Channel, Log};
@@ -25,6 +26,7 @@
 mod agreement;
 mod estimate;
 mod etfe;
+mod given;
 mod honesty;
 mod lpm;
 mod options;
@@ -40,6 +42,7 @@ mod tests;
 mod welch;
 
 pub use agreement::Agreement;
+pub use given::GivenPoint;
 pub use options::{FrequencyRange, SpectrumMethod, SpectrumOptions};
 pub use plan::{Estimator, Frequencies, Method, SpectrumPlan};
 pub use response::{BandQuality, MeasuredResponse, NoisePoint};

@@ -23,7 +23,8 @@ Row by row      `update(y, u)` and `predict(u)`, or `run` for whole arrays:
   models        `Tracker` with channels and documents; `RecursiveArx`, `RecursiveVectorArx`, `RecursiveArmax`,
                 `RecursiveOutputError`, `RecursiveNarx`, `RecursiveLeastSquares`, `WindowedLeastSquares`.
   states        `StateFilter` of a model, a `StateModel` or a `GreyBox`; `KalmanFilter`, `ExtendedKalmanFilter`,
-                `OutOfSequenceFilter`, `LuenbergerObserver`. A `ChangeDetector` watches their innovations.
+                `UnscentedKalmanFilter`, `OutOfSequenceFilter`, `LuenbergerObserver`. `fit_noise` finds Q and R.
+                A `ChangeDetector` watches their innovations.
 Warnings        `warnings_as` raises, logs or silences them; the logger is ``"thetahat"``.
 Modules         `thetahat.plot` draws, `thetahat.sklearn` fits into scikit-learn, `thetahat.dask` fits to data on many machines.
 
@@ -62,6 +63,7 @@ from thetahat._thetahat import (
     SelfTuner,
     SmoothedTrajectory,
     SteadyState,
+    UnscentedKalmanFilter,
     WindowedLeastSquares,
     __version__,
 )
@@ -106,6 +108,7 @@ from thetahat.models.report import Decision
 from thetahat.models.responses import Forecast, FrequencyResponse, StateSpace, TransientResponse
 from thetahat.models.validation import Validation
 from thetahat.online.filter import StateEstimate, StateFilter, StateTrajectory
+from thetahat.online.noise import NoiseEstimate, fit_noise
 from thetahat.online.state_model import StateModel
 from thetahat.online.track import Tracker
 from thetahat.online.tracked import Tracked, TrackTrajectory
@@ -147,6 +150,7 @@ __all__ = [
     "MeasuredResponse",
     "Model",
     "NarxOptions",
+    "NoiseEstimate",
     "NonlinearObservation",
     "NonlinearTransition",
     "NormalEquations",
@@ -180,6 +184,7 @@ __all__ = [
     "Tracker",
     "TransientResponse",
     "Tuning",
+    "UnscentedKalmanFilter",
     "Validation",
     "ValidationOptions",
     "WindowedLeastSquares",
@@ -198,6 +203,7 @@ __all__ = [
     "fir",
     "fit",
     "fit_many",
+    "fit_noise",
     "general",
     "grey",
     "inspect",

@@ -46,6 +46,7 @@ __all__ = [
     "SteadyState",
     "Stop",
     "Tracker",
+    "UnscentedKalmanFilter",
     "Validation",
     "WindowedLeastSquares",
     "__version__",
@@ -60,13 +61,17 @@ __all__ = [
     "fit",
     "fit_equations",
     "fit_equations_distributed",
+    "fit_equations_to_response",
+    "fit_noise",
     "fit_response",
+    "given_response",
     "in_python",
     "inspect",
     "inspect_file",
     "inspection",
     "policy",
     "progress",
+    "response_within",
     "row",
     "run",
     "sine_test",
@@ -329,7 +334,15 @@ def template(
 ) -> GreyBox: ...
 def templates() -> list[tuple[str, str]]: ...
 def fit_response(response: str, plan: str) -> Model: ...
+def fit_equations_to_response(response: str, model: GreyBox, plan: str) -> Model: ...
 def fit(log: Log, plan: str) -> Model: ...
+def fit_noise(
+    model: StateModel,
+    logs: Sequence[tuple[ArrayLike | None, ArrayLike, ArrayLike]],
+    structure: str,
+    max_iterations: int,
+    tolerance: float,
+) -> dict[str, Any]: ...
 def validate(model: Model, log: Log, plan: str, required: Sequence[str]) -> Validation: ...
 def answer(log: Log, plan: str, question: bytes) -> bytes: ...
 def answer_equations(log: Log, model: GreyBox, question: bytes) -> bytes: ...
@@ -371,6 +384,16 @@ def tune(
     model: Model, input: str | None, closed_loop_time: float | None, controller: str | None
 ) -> tuple[str, str]: ...
 def spectrum(log: Log, plan: str) -> tuple[str, str]: ...
+def given_response(
+    input: str,
+    output: str,
+    frequencies: Sequence[float],
+    re: Sequence[float],
+    im: Sequence[float],
+    deviations: Sequence[float] | None,
+    held: float | None,
+) -> tuple[str, str]: ...
+def response_within(response: str, low: float, high: float) -> tuple[str, str]: ...
 def step_test(log: Log, rows: Sequence[str]) -> tuple[str, str]: ...
 def design_signal(
     plan: str,
@@ -961,6 +984,75 @@ class ExtendedKalmanFilter:
     def gated_in_a_row(self) -> int: ...
     @property
     def iterations(self) -> int: ...
+
+@final
+class UnscentedKalmanFilter:
+    def __new__(
+        cls, state: ArrayLike, covariance: ArrayLike, *, transition: _Transition | None = None, observation: _Observation | None = None, gate: float = ..., release: int = 0, spread: float | None = None
+    ) -> UnscentedKalmanFilter: ...
+    @overload
+    def predict(self, u: ArrayLike | None = None, *, transition: _Transition | None = None) -> None: ...
+    @overload
+    def predict(self, u: _Transition, input: ArrayLike | None = None) -> None: ...
+    def update(
+        self, y: ArrayLike, u: ArrayLike | None = None, *, observation: _Observation | None = None
+    ) -> Innovation: ...
+    @deprecated("correct is deprecated: its name is update")
+    def correct(
+        self, observation: _Observation, measurement: ArrayLike, *, input: ArrayLike | None = None
+    ) -> Innovation: ...
+    @overload
+    def run(
+        self,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> FilterTrajectory: ...
+    @overload
+    def run(
+        self,
+        y: _Transition,
+        u: _Observation,
+        measurements: ArrayLike,
+        *,
+        inputs: ArrayLike | None = None,
+    ) -> FilterTrajectory: ...
+    @overload
+    def smooth(
+        self,
+        y: ArrayLike,
+        u: ArrayLike | None = None,
+        measurements: None = None,
+        *,
+        inputs: None = None,
+        transition: _Transition | None = None,
+        observation: _Observation | None = None,
+    ) -> SmoothedTrajectory: ...
+    @overload
+    def smooth(
+        self,
+        y: _Transition,
+        u: _Observation,
+        measurements: ArrayLike,
+        *,
+        inputs: ArrayLike | None = None,
+    ) -> SmoothedTrajectory: ...
+    @property
+    def state(self) -> _Array: ...
+    @property
+    def covariance(self) -> _Array: ...
+    @property
+    def gate(self) -> float: ...
+    @property
+    def release(self) -> int: ...
+    @property
+    def gated_in_a_row(self) -> int: ...
+    @property
+    def spread(self) -> float: ...
 
 @final
 class OutOfSequenceFilter:

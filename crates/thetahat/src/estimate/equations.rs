@@ -3,6 +3,7 @@
 mod likelihood;
 mod objective;
 mod profile;
+mod response;
 mod uncertainty;
 
 use oorandom::Rand64;
@@ -19,13 +20,11 @@ use crate::model::{
     GreyBox,
     equations::{Scale, Unknown},
 };
-use crate::respond::{
-    NisSummary,
-    equations::{Experiment, Failure},
-};
-pub(crate) use likelihood::{Likelihood, LikelihoodObjective, Slopes};
+use crate::respond::{NisSummary, equations::Failure};
+pub(crate) use likelihood::{LANE, Likelihood, LikelihoodObjective, Slopes};
 use objective::Deviance;
 pub(crate) use profile::intervals;
+pub(crate) use response::{EquationsPoint, EquationsResponse, ResponseLikelihood};
 pub(crate) use uncertainty::listed;
 
 /// How the parameters of a model in equations were found: those of the largest likelihood of its innovations.
@@ -34,9 +33,10 @@ pub struct EquationsOutcome {
     /// The sum over all measured values of -1/2 (ln 2 pi S + e^2/S).
     pub log_likelihood: f64,
     /// The normalised innovations squared of the rows: their mean is above the expected one if the noises of the log
-    /// are larger than those of the model. None where nothing was measured.
+    /// are larger than those of the model. None where nothing was measured, and of frequency responses.
     pub nis: Option<NisSummary>,
-    /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected).
+    /// What the covariance of the parameters was multiplied by: max(1, nis.mean/nis.expected). Of frequency responses
+    /// it is the mean square of the errors in their standard deviations, 1 at least where these were measured.
     pub covariance_factor: f64,
     /// What was known of the parameters before the fit, in their order.
     pub unknown: Vec<UnknownParameter>,
@@ -44,7 +44,7 @@ pub struct EquationsOutcome {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub profile: Vec<ProfileInterval>,
     /// Where the states start in the free runs on the estimation rows: a list for each state, with an entry for each
-    /// run; none where it grows out of range.
+    /// run; none where it grows out of range. Empty of frequency responses.
     pub starts: Vec<Vec<Option<f64>>>,
     /// How the search went.
     pub search: LikelihoodSearch,
@@ -138,12 +138,14 @@ pub(crate) struct EquationsEstimate {
     pub(crate) condition: f64,
     /// V, the negative logarithm of the likelihood.
     pub(crate) value: f64,
+    /// The sum of e^2/S.
+    pub(crate) squares: f64,
     /// How many values were measured.
     pub(crate) samples: usize,
     pub(crate) search: LikelihoodSearch,
 }
 
-/// The unknown parameters of the largest likelihood on some experiments.
+/// The unknown parameters of the largest likelihood, which `criterion` computes; `failed` says where it cannot.
 ///
 /// The search starts where the model says, and from `starts` further points: there the variables are drawn from what
 /// the model knows of them, N(z, sd). What reaches the largest likelihood wins, the first of them where several do. All
@@ -156,37 +158,37 @@ pub(crate) struct EquationsEstimate {
 ///
 /// # Errors
 /// As for [`fit_equations`](crate::report::fit_equations).
-pub(crate) fn largest_likelihood(
+pub(crate) fn largest_likelihood<L: Likelihood + Send>(
     model: &GreyBox,
-    experiments: &[Experiment],
+    criterion: impl Fn() -> L + Sync,
+    failed: impl Fn(Failure) -> Error,
     options: &Search,
     own_start_only: bool,
     monitor: Monitor<'_>,
 ) -> Result<EquationsEstimate, Error> {
-    let criterion = || LikelihoodObjective::new(model, experiments);
-    let starts = checked_starts(model, &criterion(), options)?;
+    let unknown = model.parameters();
+    let starts = checked_starts(unknown, &criterion(), options)?;
     let deadline = Deadline::after(options.time_limit);
     let from = |starts: Vec<Vec<f64>>| -> Result<Vec<Result<Found, Failure>>, Error> {
         let searched = starts.into_par_iter().map(|start| {
-            let mut deviance = Deviance::new(model, criterion());
+            let mut deviance = Deviance::new(unknown, criterion());
             // No likelihood is so large that it cannot be larger.
             search(&mut deviance, &start, options, f64::NEG_INFINITY, deadline, monitor)
         });
         searched.collect()
     };
     let mut searched = from(starts)?;
-    let explains =
-        |ended: &LikelihoodObjective<'_>| ended.slopes().squares <= HOPELESS * ended.measurements() as f64;
+    let explains = |ended: &L| ended.slopes().squares <= HOPELESS * ended.measurements() as f64;
     let mut ended = criterion();
-    let own = estimate_of(model, experiments, options, searched.clone(), &mut ended);
+    let own = estimate_of(unknown, &failed, options, searched.clone(), &mut ended);
     let is_a_maximum = own.as_ref().is_ok_and(|own| own.search.stopped != Stopped::NoDescent);
     if own_start_only || options.starts > 0 || (is_a_maximum && explains(&ended)) || deadline.is_over() {
         return own;
     }
-    let further = further_starts(model.parameters(), options.seed, criterion);
+    let further = further_starts(unknown, options.seed, &criterion);
     let options = Search { starts: further.len(), ..options.clone() };
     searched.extend(from(further)?);
-    let best = estimate_of(model, experiments, &options, searched, &mut ended);
+    let best = estimate_of(unknown, &failed, &options, searched, &mut ended);
     // Where nothing explains the log, what is to be said is of the model's own start.
     if best.is_ok() && (own.is_ok() || explains(&ended)) { best } else { own }
 }
@@ -221,39 +223,39 @@ fn further_starts<L: Likelihood>(
     known.into_iter().take(FURTHER).map(|(_, point)| point).collect()
 }
 
-/// The same with a likelihood that others compute, from one start after the other.
+/// The same with a likelihood that others compute, from one start after the other. `failed` says where the filter
+/// ceases to work.
 pub(crate) fn largest_likelihood_of(
     criterion: impl Likelihood,
-    model: &GreyBox,
-    experiments: &[Experiment],
+    unknown: &[Unknown],
+    failed: impl Fn(Failure) -> Error,
     options: &Search,
     monitor: Monitor<'_>,
 ) -> Result<EquationsEstimate, Error> {
-    let starts = checked_starts(model, &criterion, options)?;
+    let starts = checked_starts(unknown, &criterion, options)?;
     let deadline = Deadline::after(options.time_limit);
-    let mut deviance = Deviance::new(model, criterion);
+    let mut deviance = Deviance::new(unknown, criterion);
     let searched = starts
         .iter()
         .map(|start| search(&mut deviance, start, options, f64::NEG_INFINITY, deadline, monitor));
     let searched = searched.collect::<Result<_, Error>>()?;
-    estimate_of(model, experiments, options, searched, &mut deviance.criterion)
+    estimate_of(unknown, &failed, options, searched, &mut deviance.criterion)
 }
 
 /// The starts of a search that may begin.
 fn checked_starts(
-    model: &GreyBox,
+    unknown: &[Unknown],
     criterion: &impl Likelihood,
     options: &Search,
 ) -> Result<Vec<Vec<f64>>, Error> {
     options.check_numbers()?;
-    let unknown = model.parameters();
     let samples = criterion.measurements();
     if samples > unknown.len() {
         return Ok(starts(unknown, options));
     }
     let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
     let message = format!(
-        "{} unknown parameters need more than {samples} measured values; give a longer log",
+        "{} unknown parameters need more than {samples} measured values; give more of them",
         names.len()
     );
     Err(Error::undetermined(names, message))
@@ -261,13 +263,12 @@ fn checked_starts(
 
 /// The estimate of the best search.
 fn estimate_of(
-    model: &GreyBox,
-    experiments: &[Experiment],
+    unknown: &[Unknown],
+    failed: &impl Fn(Failure) -> Error,
     options: &Search,
     searched: Vec<Result<Found, Failure>>,
     criterion: &mut impl Likelihood,
 ) -> Result<EquationsEstimate, Error> {
-    let unknown = model.parameters();
     let names: Vec<String> = unknown.iter().map(|unknown| unknown.name.clone()).collect();
     let log_likelihood = |cost: f64| -cost / 2.0;
     let reached: Vec<Option<f64>> =
@@ -276,10 +277,10 @@ fn estimate_of(
     let best = lowest(searched.iter().map(|found| found.as_ref().ok())).unwrap_or(0);
     let best =
         searched.into_iter().nth(best).ok_or_else(|| Error::data("there is no start to search from"))?;
-    let mut found = best.map_err(|failure| failure.error(experiments))?;
+    let mut found = best.map_err(failed)?;
 
     let vanishing = without_noises(unknown, &mut found.parameters, criterion);
-    criterion.linearize(&found.parameters).map_err(|failure| failure.error(experiments))?;
+    criterion.linearize(&found.parameters).map_err(failed)?;
     let slopes: Vec<f64> =
         unknown.iter().zip(&found.parameters).map(|(unknown, z)| unknown.scale.slope(*z)).collect();
     let information = &criterion.slopes().information;
@@ -290,6 +291,7 @@ fn estimate_of(
         covariance,
         condition,
         value: found.cost() / 2.0,
+        squares: criterion.slopes().squares,
         samples: criterion.measurements(),
         search: LikelihoodSearch {
             algorithm: options.algorithm,

@@ -43,6 +43,9 @@ pub struct ProcessOutcome {
     pub noise_order: usize,
     /// Free responses that were estimated, of logs that do not begin at rest.
     pub initial_conditions: usize,
+    /// Whether, in a frequency response without errors of its own, errors were taken for relative to each point.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub relative: bool,
     /// How steps were chosen.
     pub algorithm: Algorithm,
     /// The step length of steepest descent.
@@ -157,8 +160,9 @@ fn least(
     let samples = objective.outputs().len();
     let unknowns = names.len() + beside;
     if samples <= unknowns {
+        let more = if objective.is_of_points() { "more points" } else { "a longer log" };
         let message = format!(
-            "{unknowns} unknowns need more than {samples} measured values; give a longer log, or a simpler structure"
+            "{unknowns} unknowns need more than {samples} measured values; give {more}, or a simpler structure"
         );
         return Err(Error::undetermined(names.to_vec(), message));
     }
@@ -197,7 +201,7 @@ fn least(
             white,
             colour.order(),
             beside - objective.background().offsets(),
-            samples,
+            (samples, objective.is_relative()),
         ),
     })
 }
@@ -208,12 +212,13 @@ fn outcome(
     white: Vec<Option<f64>>,
     noise_order: usize,
     initial_conditions: usize,
-    samples: usize,
+    (samples, relative): (usize, bool),
 ) -> ProcessOutcome {
     ProcessOutcome {
         white_standard_errors: white,
         noise_order,
         initial_conditions,
+        relative,
         algorithm: options.algorithm,
         step: (options.algorithm == Algorithm::Gradient).then_some(options.step),
         tolerance: options.tolerance,
@@ -242,23 +247,37 @@ struct Uncertainty {
     condition: Option<f64>,
 }
 
-/// The covariance of a fit to points, whose errors are independent: as large as the points say, and larger where they
-/// are missed by more.
+/// The covariance of a fit to points, whose errors are as large as the points say, and larger where they are missed by
+/// more; those that are not known, and relative to each point, are as large as the fit misses them:
+///
+/// ```text
+/// (Psi' Psi)^-1 (sum rho_kl psi_k psi_l') (Psi' Psi)^-1
+/// ```
+///
+/// with the correlations rho of the points' errors, which is (Psi' Psi)^-1 where these are independent (White 1980).
 fn of_points(
     root: Option<DMatrix<f64>>,
+    spread: &DMatrix<f64>,
     used: &[usize],
     count: usize,
-    variance: f64,
+    (variance, is_relative): (f64, bool),
     condition: Option<f64>,
 ) -> Uncertainty {
     let colour = Autoregression { monic: vec![1.0], variance };
-    let inverse = root.map(|root| &root * root.transpose());
+    let independent = root.map(|root| &root * root.transpose());
+    let inverse = independent.as_ref().map(|inverse| {
+        let correlated = inverse * spread * inverse;
+        // A covariance is symmetric to the bit.
+        0.5 * (&correlated + correlated.transpose())
+    });
     let place = |index: usize| used.iter().position(|own| *own == index);
     let entry = |i: usize, j: usize| Some(inverse.as_ref()?[(place(i)?, place(j)?)]);
-    let larger = variance.max(1.0);
+    let larger = if is_relative { variance } else { variance.max(1.0) };
+    let alone = if is_relative { variance } else { 1.0 };
     let rows: Option<Vec<Vec<f64>>> =
         (0..count).map(|i| (0..count).map(|j| Some(larger * entry(i, j)?)).collect()).collect();
-    let white = (0..count).map(|i| entry(i, i).map(f64::sqrt)).collect();
+    let white =
+        (0..count).map(|i| Some((alone * independent.as_ref()?[(place(i)?, place(i)?)]).sqrt())).collect();
     Uncertainty { covariance: rows.filter(|rows| is_covariance(rows)), white, colour, condition }
 }
 
@@ -330,7 +349,10 @@ fn uncertainty(
         root
     });
     if objective.is_of_points() {
-        return Ok(of_points(root, &used, names.len(), variance, condition));
+        let columns: Vec<&Vec<f64>> = used.iter().map(|place| &psi[*place]).collect();
+        let spread = DMatrix::from_row_slice(size, size, &objective.spread(&columns));
+        let own = (variance, objective.is_relative());
+        return Ok(of_points(root, &spread, &used, names.len(), own, condition));
     }
     let (residuals, columns, segments) = objective.by_segments(&psi, &used);
     let whole: Vec<usize> = (0..size).collect();

@@ -7,6 +7,8 @@ use thetahat_core::{Covariance, LinearTransition};
 
 use super::frame::{Frame, InitialState, Names, check_noise};
 use crate::Error;
+use crate::data::Offset;
+use crate::estimate::noises::Covariances;
 use crate::model::{Signal, StateSpace};
 
 /// The largest magnitudes of noises, and of what is not known of the state at the first row.
@@ -124,6 +126,22 @@ impl Linear {
             build().map_err(|error| Error::report(format!("its model has no filter: {error}")))?;
         let offsets = |signals: &[Signal]| signals.iter().map(|signal| signal.offset).collect();
         Ok((Frame { input_offsets: offsets(inputs), output_offsets: offsets(outputs), ..frame }, linear))
+    }
+
+    /// Q, R and S as they were given; none of a fitted model in innovations form, or with offsets.
+    pub(super) fn covariances(&self, frame: &Frame) -> Option<Covariances> {
+        let (n, m) = (frame.start.len(), frame.names.outputs.len());
+        let zero = Offset::default();
+        let offsets = frame.input_offsets.iter().chain(&frame.output_offsets);
+        if offsets.into_iter().any(|offset| *offset != zero) {
+            return None;
+        }
+        let r = frame.output_noise.clone();
+        Some(match &self.correlation {
+            None => Covariances { q: self.transition.noise().matrix(), r, s: DMatrix::zeros(n, m) },
+            Some(Correlation { innovations: Some(_), .. }) => return None,
+            Some(Correlation { cross, noise, .. }) => Covariances { q: noise.clone(), r, s: cross.clone() },
+        })
     }
 
     /// Whether S is not zero.

@@ -1,6 +1,7 @@
 mod bounded;
 mod equations;
 mod lags;
+mod noises;
 mod observers;
 mod reference;
 mod refusals;

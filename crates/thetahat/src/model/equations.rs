@@ -12,6 +12,7 @@ mod fitted;
 mod graph;
 mod interpolation;
 mod linear;
+mod linearized;
 mod noise;
 mod parameter;
 mod program;
@@ -30,6 +31,8 @@ pub use figures::DerivedFigure;
 use figures::Figures;
 pub use fitted::EquationsModel;
 pub(crate) use graph::{Function, Operation};
+use linearized::Entrances;
+pub(crate) use linearized::{Entrance, Linearized};
 use noise::Noise;
 pub(crate) use parameter::Unknown;
 pub(crate) use program::Program;
@@ -80,9 +83,10 @@ use crate::Error;
 /// that of one side.
 ///
 /// **Branches.** `if a > b then c else d`, with `<`, `<=`, `>` or `>=`, is one of both; what follows `else` goes as far
-/// as the expression does. `sat(x, low, high)` keeps x between two limits, `dead(x, low, high)` is 0 between them, x -
-/// low below and x - high above. A width makes them smooth: `if a > b within w then c else d` is (c + d)/2 + (c - d)/2
-/// tanh((a - b)/w), `max(x, 0 within w)` is (x + √(x² + w²))/2, and `abs(x within w)` is √(x² + w²); `min`, `sat` and
+/// as the expression does. `and`, `or` and `not` join comparisons, in parentheses or not: `if a > b and not c > d then
+/// …`. `sat(x, low, high)` keeps x between two limits, `dead(x, low, high)` is 0 between them, x - low below and x -
+/// high above. A width makes them smooth: `if a > b within w then c else d` is (c + d)/2 + (c - d)/2 tanh((a - b)/w),
+/// of one comparison, `max(x, 0 within w)` is (x + √(x² + w²))/2, and `abs(x within w)` is √(x² + w²); `min`, `sat` and
 /// `dead` are made of the same `max`. The width is a number above 0, and may be a parameter.
 ///
 /// **Tables.** `table(x; 0:3.2, 0.5:3.65, 1:4.1)` goes through values at knots that rise, by cubic polynomials that
@@ -169,6 +173,7 @@ pub struct GreyBox {
     superposes: bool,
     transition: Functions,
     observation: Functions,
+    entrances: Entrances,
     noise: Noise,
     figures: Figures,
 }

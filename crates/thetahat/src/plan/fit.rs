@@ -52,7 +52,7 @@ options! {
         /// Input columns; a name that holds a comma stands between double quotes, as in CSV
         input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R A];
         /// Output column; with `model` ss, `model` arx and `narx` one or more
-        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A];
+        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A R];
         /// Rows to estimate on, 1-based and inclusive, counted through all logs
         estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E A];
         /// Rows to validate on

@@ -1,6 +1,6 @@
 //! What `filter` says at its end.
 
-use crate::filter::{EstimatedNumber, FilterSummary};
+use crate::filter::{EstimatedNumber, FilterSummary, NoiseEstimate};
 use crate::present::Layout;
 use crate::respond::NisSummary;
 
@@ -38,6 +38,30 @@ pub fn filtered(summary: &FilterSummary, faults: &str, layout: Layout) -> String
             table(on, title, estimates);
         }
     }
+    super::text::written(on, layout)
+}
+
+/// The noises of the largest likelihood.
+pub fn noises(found: &NoiseEstimate, layout: Layout) -> String {
+    let on = &mut Sections::new(Medium::Text);
+    let iterations = found.search.iterations;
+    on.line(format!(
+        "noises of the largest likelihood: {} values measured, {iterations} iterations",
+        found.measured
+    ));
+    let start = found.search.log_likelihoods.first().copied().unwrap_or(f64::NAN);
+    on.line(format!(
+        "log-likelihood {}, of the noises of the model {}",
+        number(found.log_likelihood),
+        number(start)
+    ));
+    on.gap();
+    let mut table = columns("Noises", ["variance", "value", "standard error"]);
+    for (name, value, standard_error) in found.variances() {
+        let standard_error = (standard_error > 0.0).then_some(standard_error);
+        table.row([word(name), figure(value, number), error(standard_error)]);
+    }
+    on.table(table.none("it is known"));
     super::text::written(on, layout)
 }
 

@@ -47,11 +47,15 @@ fn document(found: &MeasuredResponse, models: &[(String, &LinearModel<'_>)], med
     let mut on = Sections::new(medium);
     let files: Vec<String> = found.logs.iter().map(|log| harmless(&log.file)).collect();
     let rows: usize = found.rows.iter().map(Rows::len).sum();
+    let clock = if found.continuous {
+        "sines in continuous time".to_owned()
+    } else {
+        format!("sample time {}", seconds(found.sample_time))
+    };
     on.line(format!(
-        "{}: {rows} rows ({}), sample time {}",
+        "{}: {rows} rows ({}), {clock}",
         some(&files, SEGMENTS, ", "),
         some(&found.rows, SEGMENTS, ", "),
-        seconds(found.sample_time)
     ));
     let title = found.method.title();
     let mut first = title.chars();

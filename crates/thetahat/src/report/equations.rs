@@ -1,8 +1,11 @@
 //! Fits of models in equations.
 
+mod response;
 #[cfg(test)]
 mod tests;
 mod warnings;
+
+pub use response::fit_equations_to_response;
 
 use thetahat_numerics::distribution::chi_square_interval;
 use thetahat_numerics::optimize::{Monitor, Search};
@@ -15,12 +18,15 @@ use crate::data::{Log, Rows, Source, Split};
 use crate::estimate::{
     Answer, Ask, Criteria, DistributedLikelihood, EquationsOutcome, Holders, NullDistribution, Procedure,
     ProfileInterval, Question,
-    equations::{EquationsEstimate, intervals, largest_likelihood, largest_likelihood_of},
+    equations::{
+        EquationsEstimate, Likelihood, LikelihoodObjective, intervals, largest_likelihood,
+        largest_likelihood_of,
+    },
 };
 use crate::model::{EquationsModel, GreyBox};
 use crate::respond::{
     NisCount, NisSummary,
-    equations::{EquationsOnLog, Experiment, Predictor, experiments, walk},
+    equations::{EquationsOnLog, Experiment, Failure, Predictor, experiments, walk},
 };
 use crate::select::Focus;
 use crate::validate::{Part, Residuals};
@@ -151,7 +157,11 @@ pub fn fit_equations(
         log,
         sources,
         plan,
-        |experiments| largest_likelihood(model, experiments, &plan.search, plan.own_start_only, monitor),
+        |experiments| {
+            let criterion = || LikelihoodObjective::new(model, experiments);
+            let failed = |failure: Failure| failure.error(experiments);
+            largest_likelihood(model, criterion, failed, &plan.search, plan.own_start_only, monitor)
+        },
         monitor,
     )
 }
@@ -196,7 +206,8 @@ pub fn fit_equations_distributed(
         |experiments| {
             let holders = Holders::new(ask, counts.len());
             let criterion = DistributedLikelihood::new(&holders, counts, model, experiments);
-            let found = largest_likelihood_of(criterion, model, experiments, &plan.search, monitor);
+            let failed = |failure: Failure| failure.error(experiments);
+            let found = largest_likelihood_of(criterion, model.parameters(), failed, &plan.search, monitor);
             holders.failure().map_or(found, Err)
         },
         monitor,
@@ -213,6 +224,17 @@ pub fn answer_equations(model: &GreyBox, log: &Log, question: &Question) -> Resu
     question.answered_by_equations(model, &experiments(model, log, &all, &all)?)
 }
 
+/// That there is something to fit.
+fn something_unknown(model: &GreyBox) -> Result<(), Error> {
+    if model.parameters().is_empty() {
+        return Err(Error::argument(
+            "model",
+            "none of its parameters is unknown; give one as { start = …, sd = …, unknown = true }",
+        ));
+    }
+    Ok(())
+}
+
 /// The report of what a search finds in the experiments of a log.
 fn fit(
     model: &GreyBox,
@@ -222,12 +244,7 @@ fn fit(
     search: impl FnOnce(&[Experiment]) -> Result<EquationsEstimate, Error>,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    if model.parameters().is_empty() {
-        return Err(Error::argument(
-            "model",
-            "none of its parameters is unknown; give one as { start = …, sd = …, unknown = true }",
-        ));
-    }
+    something_unknown(model)?;
     let names: Vec<&str> = model.inputs().iter().chain(model.outputs()).map(String::as_str).collect();
     let absent: Vec<&str> = names.iter().filter(|name| !log.has(name)).copied().collect();
     if let Some(name) = absent.first() {
@@ -244,9 +261,8 @@ fn fit(
     let Errors { nis, mse, noise } = errors(model, &fitted_to, &found)?;
     let factor = nis.map_or(1.0, |nis| nis.relative().max(1.0));
     let profile = if plan.profile {
-        let ends = intervals(model, &fitted_to, &found, factor, &plan.search, monitor)?;
-        let named = model.unknown().zip(ends);
-        named.map(|(name, [low, high])| ProfileInterval { name: name.to_owned(), low, high }).collect()
+        let criterion = || LikelihoodObjective::new(model, &fitted_to);
+        profiled(model, criterion, &found, factor, &plan.search, monitor)?
     } else {
         Vec::new()
     };
@@ -302,6 +318,19 @@ fn fit(
         evaluate(&mut report, &on_log, part, Focus::Auto);
     }
     Ok(report.with_purpose())
+}
+
+/// The intervals of the parameters by profile likelihood.
+fn profiled<L: Likelihood>(
+    model: &GreyBox,
+    criterion: impl Fn() -> L + Sync,
+    found: &EquationsEstimate,
+    factor: f64,
+    search: &Search,
+    monitor: Monitor<'_>,
+) -> Result<Vec<ProfileInterval>, Error> {
+    let named = model.unknown().zip(intervals(model, criterion, found, factor, search, monitor)?);
+    Ok(named.map(|(name, [low, high])| ProfileInterval { name: name.to_owned(), low, high }).collect())
 }
 
 /// How large the innovations of a fit are.

@@ -3,11 +3,13 @@
 
 mod experiment;
 mod free_run;
+mod frequency;
 mod on_log;
 mod predictor;
 mod walk;
 
 pub(crate) use experiment::{Experiment, experiments};
+pub(crate) use frequency::response;
 pub(crate) use on_log::EquationsOnLog;
-pub(crate) use predictor::Predictor;
+pub(crate) use predictor::{Innovation, Predictor};
 pub(crate) use walk::{Failure, reach, step, walk};

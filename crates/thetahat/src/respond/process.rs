@@ -6,4 +6,4 @@ mod sampled;
 
 pub(crate) use held::{HeldLog, at_rest, free_sensitivities, held_logs, modes, run, sensitivities};
 pub(crate) use on_log::ProcessOnLog;
-pub(crate) use sampled::{response_slopes, responses};
+pub(crate) use sampled::{Points, response_slopes, responses};

@@ -36,7 +36,8 @@ impl MeasuredResponse {
     /// more do.
     ///
     /// # Errors
-    /// [`Error::Argument`] if the model has another sample time, or a pole at one of the frequencies.
+    /// [`Error::Argument`] if the model has another sample time, or a pole at one of the frequencies; if only one of
+    /// the two is in continuous time.
     ///
     /// ```
     /// use thetahat::data::{Channel, Log, Record};
@@ -90,7 +91,14 @@ impl MeasuredResponse {
     /// # Errors
     /// As for [`agreement`](Self::agreement).
     pub fn overlaid(&self, model: &LinearModel<'_>) -> Result<Vec<FrequencyResponse>, Error> {
-        if matches!(model, LinearModel::Continuous(..)) {
+        let is_continuous = matches!(model, LinearModel::Continuous(..));
+        if self.continuous && !is_continuous {
+            return Err(Error::argument(
+                "model",
+                "it is of samples, and the response of sines in continuous time: convert it to continuous time first",
+            ));
+        }
+        if is_continuous && !self.continuous {
             return Err(Error::argument(
                 "model",
                 format!(
@@ -99,7 +107,7 @@ impl MeasuredResponse {
                 ),
             ));
         }
-        if (model.sample_time() / self.sample_time - 1.0).abs() > 0.01 {
+        if !self.continuous && (model.sample_time() / self.sample_time - 1.0).abs() > 0.01 {
             return Err(Error::argument(
                 "model",
                 format!(
@@ -109,7 +117,7 @@ impl MeasuredResponse {
                 ),
             ));
         }
-        let highest = PI / model.sample_time();
+        let highest = if self.continuous { f64::INFINITY } else { PI / model.sample_time() };
         let mut all = Vec::new();
         for measured in &self.responses {
             let frequencies: Vec<f64> =

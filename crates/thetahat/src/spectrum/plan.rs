@@ -41,6 +41,8 @@ pub enum Method {
         /// How many periods of each segment are left out at its beginning.
         discard: Option<usize>,
     },
+    /// Points that were measured elsewhere: no estimate from a log.
+    Given,
 }
 
 /// Which ratio of spectra is the response.
@@ -110,7 +112,7 @@ impl fmt::Display for Method {
 }
 
 impl Method {
-    /// Its word: `lpm`, `spa`, `welch`, `etfe` or `sines`.
+    /// Its word: `lpm`, `spa`, `welch`, `etfe`, `sines` or `given`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Lpm { .. } => "lpm",
@@ -118,6 +120,7 @@ impl Method {
             Self::Welch { .. } => "welch",
             Self::Etfe => "etfe",
             Self::Sines { .. } => "sines",
+            Self::Given => "given",
         }
     }
 
@@ -144,6 +147,7 @@ impl Method {
                 size(period, "", " rows each"),
                 size(discard, "without the first ", "")
             ),
+            Self::Given => "points that were measured elsewhere".to_owned(),
         }
     }
 
@@ -151,6 +155,14 @@ impl Method {
     fn has_lines(&self) -> bool {
         !matches!(self, Self::Lpm { .. } | Self::Spa { .. })
     }
+}
+
+/// What there is to say of a plan that asks for points from elsewhere.
+pub(super) fn given() -> Error {
+    Error::argument(
+        "method",
+        "given is of points that were measured elsewhere; of a log take lpm, spa, welch, etfe or sines",
+    )
 }
 
 impl SpectrumPlan {
@@ -194,6 +206,7 @@ impl SpectrumPlan {
             Method::Welch { window, .. } => ("window", window, 8),
             Method::Etfe => ("window", None, 1),
             Method::Sines { period, .. } => ("period", period, 3),
+            Method::Given => return Err(given()),
         };
         if let Some(size) = size.filter(|size| *size < least) {
             return Err(Error::argument(argument, format!("{size}: give {least} at least")));

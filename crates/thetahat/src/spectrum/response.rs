@@ -1,6 +1,7 @@
 //! The document.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use super::plan::Method;
 use crate::data::{Rows, Source};
 use crate::document::document_methods;
-use crate::respond::FrequencyResponse;
+use crate::respond::{Correlation, FrequencyResponse};
 use crate::{Document, Error};
 
-/// The frequency response from each input to the output, estimated from a log without a model. The JSON document
-/// `thetahat.response/1`.
+/// The frequency response from each input to the output, estimated from a log without a model, or measured elsewhere
+/// ([`given`](Self::given)). The JSON document `thetahat.response/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MeasuredResponse {
     /// `thetahat.response/1`.
@@ -23,8 +24,13 @@ pub struct MeasuredResponse {
     pub logs: Vec<Source>,
     /// The segments of rows that were used, counted through all logs.
     pub rows: Vec<Rows>,
-    /// Seconds from one row to the next.
+    /// Seconds from one row to the next, during which the input is held; of sines in continuous time half the period of
+    /// the highest frequency.
     pub sample_time: f64,
+    /// Whether it is the response to sines in continuous time, as an analyser or an impedance meter measures it, and
+    /// not to inputs that are held from row to row.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub continuous: bool,
     /// What was taken from each channel first: `none`, `mean`, `linear` or `start:K`.
     pub detrend: String,
     /// How it was estimated.
@@ -68,6 +74,22 @@ pub struct BandQuality {
 }
 
 impl MeasuredResponse {
+    /// How the errors of its points are correlated.
+    pub(crate) fn correlation(&self) -> Correlation {
+        let rows = self.rows.iter().map(Rows::len).max().unwrap_or(0) as f64;
+        let seconds = |rows: usize| rows as f64 * self.sample_time;
+        match self.method {
+            Method::Lpm { half_width: Some(lines) } => {
+                Correlation::Parabolas(lines as f64 * TAU / (rows * self.sample_time))
+            }
+            Method::Spa { lags: Some(lags) } => Correlation::Lags(seconds(lags)),
+            Method::Welch { window: Some(window), .. } => Correlation::Windows(seconds(window)),
+            // Documents have the sizes; lines of their own are independent.
+            Method::Lpm { .. } | Method::Spa { .. } | Method::Welch { .. } => Correlation::None,
+            Method::Etfe | Method::Sines { .. } | Method::Given => Correlation::None,
+        }
+    }
+
     /// The response from an input, if it is one.
     pub fn from_input(&self, input: &str) -> Option<&FrequencyResponse> {
         self.responses.iter().find(|response| response.input.as_deref() == Some(input))

@@ -5,7 +5,7 @@ use thetahat_numerics::distribution::student_two_sided;
 
 use super::estimate::{Bands, Empty, Estimate, Line, LineEstimate};
 use super::honesty::{self, Outside};
-use super::plan::{Method, SpectrumPlan};
+use super::plan::{Method, SpectrumPlan, given};
 use super::response::{BandQuality, MeasuredResponse, NoisePoint};
 use super::signals::Signals;
 use super::{etfe, lpm, sines, spa, welch};
@@ -88,6 +88,7 @@ pub fn spectrum(log: &Log, sources: &[Source], plan: &SpectrumPlan) -> Result<Me
             used = rows;
             estimate
         }
+        Method::Given => return Err(given()),
     };
     if estimate.lines.is_empty() {
         return Err(Error::argument(
@@ -150,6 +151,7 @@ fn document(
         logs: sources.to_vec(),
         rows: used.iter().map(|rows| Rows::new(rows.start + 1, rows.end)).collect::<Result<_, _>>()?,
         sample_time,
+        continuous: false,
         detrend: plan.detrend.to_string(),
         method,
         output: plan.output.clone(),

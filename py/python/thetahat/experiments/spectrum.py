@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thetahat import _thetahat
 from thetahat.base import numbers as _numbers
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 
 class MeasuredResponse(Document, Table):
-    """The frequency response estimated from a log: the document of ``thetahat spectrum``.
+    """The frequency response estimated from a log, or measured elsewhere (`given`): the document of ``thetahat spectrum``.
 
     As a frame it has a row for each input and frequency.
 
@@ -40,6 +40,89 @@ class MeasuredResponse(Document, Table):
     >>> found.magnitude.shape, found.coherence.shape
     ((1, 200), (200,))
     """
+
+    @classmethod
+    def given(
+        cls,
+        frequencies: ArrayLike,
+        values: ArrayLike,
+        *,
+        input: str = "u",
+        output: str = "y",
+        standard_deviations: ArrayLike | None = None,
+        held: float | None = None,
+    ) -> MeasuredResponse:
+        """The response of points that were measured elsewhere: by an analyser, or as an impedance.
+
+        Parameters
+        ----------
+        frequencies : array_like, shape (K,)
+            Radians per second, in any order.
+        values : array_like of complex, shape (K,)
+            The response at each.
+        input, output : str
+            What the channels are called.
+        standard_deviations : array_like, shape (K,), optional
+            That of the real part of each point, which is that of the imaginary part too. Without them fits count errors relative to
+            each point, and find how large these are.
+        held : float, optional
+            For how many seconds the input was held from sample to sample; without it the input was a sine in continuous time.
+
+        Returns
+        -------
+        MeasuredResponse
+
+        Raises
+        ------
+        ValueError
+            For points that are not finite, frequencies below 0 or above pi/held, arrays of other lengths.
+
+        Examples
+        --------
+        The impedance of 10 ohm beside 1 F, in series with 2 ohm:
+
+        >>> import numpy as np
+        >>> import thetahat as th
+        >>> omega = np.logspace(-3, 1, 30)
+        >>> impedance = th.MeasuredResponse.given(omega, 2 + 10 / (1 + 10j * omega), input="current", output="voltage")
+        >>> impedance
+        MeasuredResponse(given, 30 frequencies, current)
+        >>> th.process(impedance, "rc1").parameters.round(6)
+        array([ 2., 10., 10.])
+        """
+        omega = _numbers.column("frequencies", frequencies)
+        points = np.asarray(values, dtype=np.complex128)
+        deviations = None if standard_deviations is None else _numbers.column("standard_deviations", standard_deviations)
+        for name, array in (("values", points), ("standard_deviations", deviations)):
+            if array is not None and array.shape != omega.shape:
+                raise ValueError(f"{name}: {array.shape} beside frequencies {omega.shape}: give one for each frequency")
+        own = None if deviations is None else deviations.tolist()
+        return cls(*_thetahat.given_response(input, output, omega.tolist(), points.real.tolist(), points.imag.tolist(), own, held))
+
+    def within(self, low: float, high: float) -> MeasuredResponse:
+        """The points from one frequency to another, in radians per second.
+
+        Parameters
+        ----------
+        low, high : float
+            The ends, both included.
+
+        Returns
+        -------
+        MeasuredResponse
+
+        Raises
+        ------
+        ValueError
+            If there is no point between them above frequency 0.
+
+        Examples
+        --------
+        >>> import thetahat as th
+        >>> th.MeasuredResponse.given([1.0, 2.0, 4.0], [1.0, 0.5, 0.2]).within(1, 3).frequencies
+        array([1., 2.])
+        """
+        return type(self)(*_thetahat.response_within(self.to_json(), low, high))
 
     @property
     def inputs(self) -> list[str]:
@@ -115,8 +198,13 @@ class MeasuredResponse(Document, Table):
 
     @property
     def sample_time(self) -> float:
-        """Seconds from one row to the next."""
+        """Seconds from one row to the next; of sines in continuous time half the period of the highest frequency."""
         return float(self.document["sample_time"])
+
+    @property
+    def continuous(self) -> bool:
+        """Whether it is of sines in continuous time, and not of inputs that are held from row to row."""
+        return bool(self.document.get("continuous", False))
 
     def to_control(self) -> Any:
         """The response as a `control.FrequencyResponseData`, of one output and all inputs.
@@ -135,7 +223,7 @@ class MeasuredResponse(Document, Table):
         (1, 1)
         """
         return _convert.response_to_control(
-            self.values, self.frequencies, self.sample_time, self.inputs, self.output
+            self.values, self.frequencies, 0.0 if self.continuous else self.sample_time, self.inputs, self.output
         )
 
     def to_frequency_response(self) -> FrequencyResponse:

@@ -16,6 +16,7 @@ from thetahat.base import numbers as _numbers
 from thetahat.engine import files as _files, options as _options
 from thetahat.engine.option_types import EquationsOptions
 from thetahat.engine.runs import Simulates
+from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.fits.expressions import Expression, Names, Written
 from thetahat.fits.fit import told
 from thetahat.logs.log import Log, handle
@@ -324,7 +325,7 @@ Equations = Union[GreyBox, str, "os.PathLike[str]", Mapping[str, Any]]
 
 @_options.takes(EquationsOptions)
 def grey(
-    log: Log,
+    log: Log | MeasuredResponse,
     model: Equations,
     **options: Unpack[EquationsOptions],
 ) -> Model:
@@ -332,9 +333,10 @@ def grey(
 
     Parameters
     ----------
-    log : Log
+    log : Log or MeasuredResponse
         The data, with the channels of the model by name. The clock may be uneven (``uniform=False``); joined logs are experiments that
-        each begin as the model says.
+        each begin as the model says. Or a frequency response, such as an impedance (`MeasuredResponse.given`): the equations near
+        the state in which they start come closest to its points, in units of their errors.
     model : GreyBox, str, path or dict
         The equations; or ``"template:battery"`` and its like, a plant that is ready, whose columns go by their names in the log, see
         `thetahat.templates`.
@@ -380,6 +382,11 @@ def grey(
     >>> model.parameters.round(2)
     array([2.])
     """
+    if isinstance(log, MeasuredResponse):
+        if isinstance(model, str) and model.startswith("template:") and "\n" not in model:
+            raise ValueError("model: a template finds its start values in a log; give equations with start values of their own")
+        box = model if isinstance(model, GreyBox) else GreyBox(model)
+        return told(Model._of(_thetahat.fit_equations_to_response(log.to_json(), box._model, _options.plan(options))))
     data = handle("log", log)
     if isinstance(model, str) and model.startswith("template:") and "\n" not in model:
         model = from_template(log, model[len("template:") :], {}, {}, options.get("estimate"), options.get("split"))

@@ -19,8 +19,9 @@ True
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
 from thetahat import _thetahat
 from thetahat.fits.grey_box import GreyBox, from_template
@@ -64,6 +65,52 @@ def summary(name: str) -> str:
     return every[name]
 
 
+_F = TypeVar("_F", bound=Callable[..., GreyBox])
+
+_TOLD = """
+
+    Parameters
+    ----------
+    log : Log
+        The data.
+    {columns} : str, optional
+        Which column is which, where its name does not say.
+    known : dict of str to float, optional
+        Parameters that are known{numbers}.
+    estimate : slice, str or list of them, optional
+        The rows that start values are found from, as for `thetahat.grey`.
+
+    Raises
+    ------
+    EstimationError
+        If the log does not say start values, with the reason.
+    ValueError
+        If a column is not there, or the template has no such number.
+    """
+
+
+def _template(*numbers: str) -> Callable[[_F], _F]:
+    """A template with these numbers that are taken as known: its docstring says what those of all say, its columns are its own."""
+
+    def told(function: _F) -> _F:
+        columns = [name for name in inspect.signature(function).parameters if name not in ("log", "known", "estimate")]
+        known = f", and {', '.join(numbers)}" if numbers else ""
+        # Python leaves docstrings out where it is asked to (-OO).
+        if function.__doc__ is not None:
+            function.__doc__ += _TOLD.format(columns=", ".join(columns), numbers=known)
+        return function
+
+    return told
+
+
+def _made(name: str, given: dict[str, Any]) -> GreyBox:
+    """The model of a template with the arguments of its function: what is no other argument is a column."""
+    columns = dict(given)
+    log, known, estimate = (columns.pop(argument) for argument in ("log", "known", "estimate"))
+    return from_template(log, name, columns, known or {}, estimate)
+
+
+@_template("rated_voltage")
 def motor(
     log: Log,
     *,
@@ -73,30 +120,11 @@ def motor(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A motor for direct current: its resistance, inductance, torque constant, inertia and friction.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    voltage, current, speed : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and rated_voltage.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"voltage": voltage, "current": current, "speed": speed}
-    return from_template(log, "motor", columns, known or {}, estimate)
+    """A motor for direct current: its resistance, inductance, torque constant, inertia and friction."""
+    return _made("motor", locals())
 
 
+@_template("max_voltage", "position_error", "velocity_error", "effort", "period")
 def mechanism(
     log: Log,
     *,
@@ -106,30 +134,11 @@ def mechanism(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """The feedforward of a mechanism that gravity does not move: kS, kV and kA, with gains of feedback.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    voltage, velocity, position : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and max_voltage, position_error, velocity_error, effort, period.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"voltage": voltage, "velocity": velocity, "position": position}
-    return from_template(log, "mechanism", columns, known or {}, estimate)
+    """The feedforward of a mechanism that gravity does not move: kS, kV and kA, with gains of feedback."""
+    return _made("mechanism", locals())
 
 
+@_template("max_voltage", "position_error", "velocity_error", "effort", "period")
 def elevator(
     log: Log,
     *,
@@ -139,30 +148,11 @@ def elevator(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """The feedforward of an elevator: kS, kV, kA and kG, with gains of feedback.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    voltage, velocity, position : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and max_voltage, position_error, velocity_error, effort, period.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"voltage": voltage, "velocity": velocity, "position": position}
-    return from_template(log, "elevator", columns, known or {}, estimate)
+    """The feedforward of an elevator: kS, kV, kA and kG, with gains of feedback."""
+    return _made("elevator", locals())
 
 
+@_template("max_voltage", "position_error", "velocity_error", "effort", "period")
 def arm(
     log: Log,
     *,
@@ -172,30 +162,11 @@ def arm(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """The feedforward of an arm: kS, kV, kA, kG and the offset of its angle, with gains of feedback.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    voltage, velocity, angle : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and max_voltage, position_error, velocity_error, effort, period.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"voltage": voltage, "velocity": velocity, "angle": angle}
-    return from_template(log, "arm", columns, known or {}, estimate)
+    """The feedforward of an arm: kS, kV, kA, kG and the offset of its angle, with gains of feedback."""
+    return _made("arm", locals())
 
 
+@_template("capacity", "first_soc", "knots")
 def battery(
     log: Log,
     *,
@@ -204,30 +175,11 @@ def battery(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A battery with one RC pair: its resistances, time constant, and table of open-circuit voltages.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    current, voltage : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and capacity, first_soc, knots.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"current": current, "voltage": voltage}
-    return from_template(log, "battery", columns, known or {}, estimate)
+    """A battery with one RC pair: its resistances, time constant, and table of open-circuit voltages."""
+    return _made("battery", locals())
 
 
+@_template("capacity", "first_soc", "knots")
 def battery2(
     log: Log,
     *,
@@ -236,30 +188,11 @@ def battery2(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A battery with two RC pairs: its resistances, time constants, and table of open-circuit voltages.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    current, voltage : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and capacity, first_soc, knots.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"current": current, "voltage": voltage}
-    return from_template(log, "battery2", columns, known or {}, estimate)
+    """A battery with two RC pairs: its resistances, time constants, and table of open-circuit voltages."""
+    return _made("battery2", locals())
 
 
+@_template()
 def room(
     log: Log,
     *,
@@ -270,30 +203,11 @@ def room(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A room with one heat capacity, a heater, and the sun if it is there.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    temperature, heater, outdoor, sun : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"temperature": temperature, "heater": heater, "outdoor": outdoor, "sun": sun}
-    return from_template(log, "room", columns, known or {}, estimate)
+    """A room with one heat capacity, a heater, and the sun if it is there."""
+    return _made("room", locals())
 
 
+@_template()
 def room2(
     log: Log,
     *,
@@ -304,30 +218,11 @@ def room2(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A room with two heat capacities, of air and walls.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    temperature, heater, outdoor, sun : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"temperature": temperature, "heater": heater, "outdoor": outdoor, "sun": sun}
-    return from_template(log, "room2", columns, known or {}, estimate)
+    """A room with two heat capacities, of air and walls."""
+    return _made("room2", locals())
 
 
+@_template()
 def tank(
     log: Log,
     *,
@@ -336,30 +231,11 @@ def tank(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A tank with an inflow, and an outlet in its floor.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    inflow, level : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"inflow": inflow, "level": level}
-    return from_template(log, "tank", columns, known or {}, estimate)
+    """A tank with an inflow, and an outlet in its floor."""
+    return _made("tank", locals())
 
 
+@_template("gravity")
 def pendulum(
     log: Log,
     *,
@@ -368,30 +244,11 @@ def pendulum(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A pendulum, driven by a torque or not.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    angle, torque : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and gravity.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"angle": angle, "torque": torque}
-    return from_template(log, "pendulum", columns, known or {}, estimate)
+    """A pendulum, driven by a torque or not."""
+    return _made("pendulum", locals())
 
 
+@_template()
 def spring(
     log: Log,
     *,
@@ -400,30 +257,11 @@ def spring(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A mass on a spring with a damper, driven by a force.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    force, position : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"force": force, "position": position}
-    return from_template(log, "spring", columns, known or {}, estimate)
+    """A mass on a spring with a damper, driven by a force."""
+    return _made("spring", locals())
 
 
+@_template("heat_capacity", "exponent")
 def exchanger(
     log: Log,
     *,
@@ -434,30 +272,11 @@ def exchanger(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """A heat exchanger whose flow changes.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    flow, outlet, inlet, medium : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and heat_capacity, exponent.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"flow": flow, "outlet": outlet, "inlet": inlet, "medium": medium}
-    return from_template(log, "exchanger", columns, known or {}, estimate)
+    """A heat exchanger whose flow changes."""
+    return _made("exchanger", locals())
 
 
+@_template("loop_time")
 def multirotor(
     log: Log,
     *,
@@ -466,25 +285,5 @@ def multirotor(
     known: Mapping[str, float] | None = None,
     estimate: Any = None,
 ) -> GreyBox:
-    """An axis of a multirotor: its gain, the lag of its motors and the delay, with gains of a rate loop.
-
-    Parameters
-    ----------
-    log : Log
-        The data.
-    command, rate : str, optional
-        Which column is which, where its name does not say.
-    known : dict of str to float, optional
-        Parameters that are known, and loop_time.
-    estimate : slice, str or list of them, optional
-        The rows that start values are found from, as for `thetahat.grey`.
-
-    Raises
-    ------
-    EstimationError
-        If the log does not say start values, with the reason.
-    ValueError
-        If a column is not there, or the template has no such number.
-    """
-    columns = {"command": command, "rate": rate}
-    return from_template(log, "multirotor", columns, known or {}, estimate)
+    """An axis of a multirotor: its gain, the lag of its motors and the delay, with gains of a rate loop."""
+    return _made("multirotor", locals())

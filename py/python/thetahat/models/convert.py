@@ -125,7 +125,7 @@ def response_to_control(
     frequencies : array_like, shape (K,)
         Radians per second.
     sample_time : float
-        Seconds from one sample to the next.
+        Seconds from one sample to the next; 0 in continuous time.
     input_names : sequence of str
         The inputs' names.
     output_name : str
@@ -134,7 +134,7 @@ def response_to_control(
     Returns
     -------
     control.FrequencyResponseData
-        In discrete time with ``dt`` the sample time.
+        With ``dt`` the sample time.
 
     Raises
     ------

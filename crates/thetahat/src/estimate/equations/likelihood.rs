@@ -15,15 +15,19 @@
 //! System Identification, 2nd ed. 1999, sections 7.4 and 7.6).
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thetahat_core::Dual;
 
 use crate::model::GreyBox;
-use crate::respond::equations::{Experiment, Failure, Predictor, reach, step, walk};
+use crate::respond::equations::{Experiment, Failure, Innovation, Predictor, reach, step, walk};
 
 /// Derivatives that are computed together.
-const LANE: usize = 4;
+pub(crate) const LANE: usize = 4;
+/// Rows that lanes go over before their innovations are added: these fit into a cache.
+const BLOCK: usize = 1024;
 
 /// V of a model as a function of the variables z, wherever the logs are.
 pub(crate) trait Likelihood {
@@ -56,10 +60,40 @@ impl Slopes {
         Self { squares: 0.0, gradient: vec![0.0; size], information: vec![0.0; size * size] }
     }
 
-    fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.squares = 0.0;
         self.gradient.fill(0.0);
         self.information.fill(0.0);
+    }
+
+    /// Adds an element: e and S, and e_i and S_i. Of I what is below the diagonal and on it.
+    pub(crate) fn take(&mut self, (error, variance): (f64, f64), (by_error, by_variance): (&[f64], &[f64])) {
+        self.squares += error * error / variance;
+        let variance_weight = (1.0 - error * error / variance) / (2.0 * variance);
+        let size = self.gradient.len();
+        for (i, (&e, &s)) in by_error.iter().zip(by_variance).enumerate() {
+            self.gradient[i] += error * e / variance + variance_weight * s;
+            let (error_weight, variance_weight) = (e / variance, s / (2.0 * variance * variance));
+            for j in 0..=i {
+                self.information[i * size + j] +=
+                    error_weight * by_error[j] + variance_weight * by_variance[j];
+            }
+        }
+    }
+
+    /// Whether all sums are numbers: what is not one stays in them.
+    pub(crate) fn is_finite(&self) -> bool {
+        self.gradient.iter().chain(&self.information).copied().all(f64::is_finite)
+    }
+
+    /// Writes what is above the diagonal of I from what is below.
+    pub(crate) fn mirror(&mut self) {
+        let size = self.gradient.len();
+        for i in 0..size {
+            for j in 0..i {
+                self.information[j * size + i] = self.information[i * size + j];
+            }
+        }
     }
 
     /// Sums of these and of others, which are as many.
@@ -80,19 +114,58 @@ pub(crate) struct LikelihoodObjective<'a> {
     /// The elements that are measured in rows that count.
     measurements: usize,
     plain: Predictor<f64>,
-    lanes: Vec<Predictor<Dual<f64, LANE>>>,
-    /// The parameters as the lanes see them: variables in one, constants in the others.
-    variables: Vec<Vec<Dual<f64, LANE>>>,
+    lanes: Vec<Lane>,
     /// e_i and S_i.
     error_slopes: Vec<f64>,
     variance_slopes: Vec<f64>,
     slopes: Slopes,
 }
 
+/// The filter with the derivatives by some parameters.
+#[derive(Debug)]
+struct Lane {
+    predictor: Predictor<Dual<f64, LANE>>,
+    /// All parameters, those of the lane as variables.
+    variables: Vec<Dual<f64, LANE>>,
+    /// The innovations of some rows that count, element after element.
+    innovations: Vec<Innovation<Dual<f64, LANE>>>,
+}
+
+impl Lane {
+    /// Goes on over some rows of an experiment.
+    fn walk(
+        &mut self,
+        model: &GreyBox,
+        (log, experiment): (usize, &Experiment),
+        rows: Range<usize>,
+    ) -> Result<(), Failure> {
+        let Self { predictor, variables, innovations } = self;
+        innovations.clear();
+        for row in rows {
+            let failure = Failure { log, row };
+            if !experiment.counts(row) {
+                step(model, experiment, predictor, variables, row, |_, _, _| {}).ok_or(failure)?;
+                continue;
+            }
+            reach(model, experiment, predictor, variables, row);
+            for (index, &measured) in experiment.output(row).iter().enumerate() {
+                if !measured.is_nan() {
+                    innovations.push(predictor.absorb(index, measured).ok_or(failure)?);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
 impl<'a> LikelihoodObjective<'a> {
     pub(crate) fn new(model: &'a GreyBox, experiments: &'a [Experiment]) -> Self {
         let size = model.parameters().len();
-        let lanes = size.div_ceil(LANE);
+        let lane = |_| Lane {
+            predictor: Predictor::new(model),
+            variables: vec![Dual::from(0.0); size],
+            innovations: Vec::new(),
+        };
         let measurements = |experiment: &Experiment| -> usize {
             (0..model.outputs().len()).map(|output| experiment.measurements(output)).sum()
         };
@@ -101,12 +174,36 @@ impl<'a> LikelihoodObjective<'a> {
             experiments,
             measurements: experiments.iter().map(measurements).sum(),
             plain: Predictor::new(model),
-            lanes: (0..lanes).map(|_| Predictor::new(model)).collect(),
-            variables: vec![vec![Dual::from(0.0); size]; lanes],
+            lanes: (0..size.div_ceil(LANE)).map(lane).collect(),
             error_slopes: vec![0.0; size],
             variance_slopes: vec![0.0; size],
             slopes: Slopes::zero(size),
         }
+    }
+}
+
+impl LikelihoodObjective<'_> {
+    /// Adds what the lanes have found in some rows.
+    fn add(&mut self, log: usize, experiment: &Experiment, rows: Range<usize>) -> Result<(), Failure> {
+        let mut element = 0;
+        for row in rows.filter(|row| experiment.counts(*row)) {
+            for _ in experiment.output(row).iter().filter(|measured| !measured.is_nan()) {
+                let (mut error, mut variance) = (0.0, 0.0);
+                let slopes = self.error_slopes.chunks_mut(LANE).zip(self.variance_slopes.chunks_mut(LANE));
+                for (lane, (by_error, by_variance)) in self.lanes.iter().zip(slopes) {
+                    let innovation = &lane.innovations[element];
+                    (error, variance) = (innovation.error.value, innovation.variance.value);
+                    by_error.copy_from_slice(&innovation.error.derivatives[..by_error.len()]);
+                    by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);
+                }
+                element += 1;
+                self.slopes.take((error, variance), (&self.error_slopes, &self.variance_slopes));
+            }
+            if !self.slopes.is_finite() {
+                return Err(Failure { log, row });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -125,71 +222,30 @@ impl Likelihood for LikelihoodObjective<'_> {
         Ok(sum / 2.0)
     }
 
-    /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, and N p^2. Slopes that are not
-    /// finite are a failure too.
+    /// V_i and I_ij for p parameters: p/4 times the filter in numbers of five parts, side by side, and N p^2. Slopes
+    /// that are not finite are a failure too. The sums are those of one thread.
     fn linearize(&mut self, z: &[f64]) -> Result<(), Failure> {
-        for (lane, variables) in self.variables.iter_mut().enumerate() {
-            for (index, (variable, &value)) in variables.iter_mut().zip(z).enumerate() {
+        for (number, lane) in self.lanes.iter_mut().enumerate() {
+            for (index, (variable, &value)) in lane.variables.iter_mut().zip(z).enumerate() {
                 *variable = Dual::from(value);
-                if index / LANE == lane {
+                if index / LANE == number {
                     variable.derivatives[index % LANE] = 1.0;
                 }
             }
         }
-        let size = self.slopes.gradient.len();
         self.slopes.clear();
+        let model = self.model;
         for (log, experiment) in self.experiments.iter().enumerate() {
-            for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
-                lane.restart(self.model, variables);
-            }
-            for row in 0..experiment.rows() {
-                let failure = Failure { log, row };
-                if !experiment.counts(row) {
-                    for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
-                        step(self.model, experiment, lane, variables, row, |_, _, _| {}).ok_or(failure)?;
-                    }
-                    continue;
-                }
-                for (lane, variables) in self.lanes.iter_mut().zip(&self.variables) {
-                    reach(self.model, experiment, lane, variables, row);
-                }
-                for (index, &measured) in experiment.output(row).iter().enumerate() {
-                    if measured.is_nan() {
-                        continue;
-                    }
-                    let (mut error, mut variance) = (0.0, 0.0);
-                    let slopes =
-                        self.error_slopes.chunks_mut(LANE).zip(self.variance_slopes.chunks_mut(LANE));
-                    for (lane, (by_error, by_variance)) in self.lanes.iter_mut().zip(slopes) {
-                        let innovation = lane.absorb(index, measured).ok_or(failure)?;
-                        (error, variance) = (innovation.error.value, innovation.variance.value);
-                        by_error.copy_from_slice(&innovation.error.derivatives[..by_error.len()]);
-                        by_variance.copy_from_slice(&innovation.variance.derivatives[..by_variance.len()]);
-                    }
-                    self.slopes.squares += error * error / variance;
-                    let variance_weight = (1.0 - error * error / variance) / (2.0 * variance);
-                    for i in 0..size {
-                        let (e, s) = (self.error_slopes[i], self.variance_slopes[i]);
-                        self.slopes.gradient[i] += error * e / variance + variance_weight * s;
-                        let (by_error, by_variance) = (e / variance, s / (2.0 * variance * variance));
-                        for j in 0..=i {
-                            self.slopes.information[i * size + j] +=
-                                by_error * self.error_slopes[j] + by_variance * self.variance_slopes[j];
-                        }
-                    }
-                }
-                // What is not a number stays in the sums.
-                let sums = self.slopes.gradient.iter().chain(&self.slopes.information);
-                if !sums.copied().all(f64::is_finite) {
-                    return Err(failure);
-                }
+            self.lanes.iter_mut().for_each(|lane| lane.predictor.restart(model, &lane.variables));
+            for first in (0..experiment.rows()).step_by(BLOCK) {
+                let rows = first..experiment.rows().min(first + BLOCK);
+                self.lanes
+                    .par_iter_mut()
+                    .try_for_each(|lane| lane.walk(model, (log, experiment), rows.clone()))?;
+                self.add(log, experiment, rows)?;
             }
         }
-        for i in 0..size {
-            for j in 0..i {
-                self.slopes.information[j * size + i] = self.slopes.information[i * size + j];
-            }
-        }
+        self.slopes.mirror();
         Ok(())
     }
 

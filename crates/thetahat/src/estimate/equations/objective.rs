@@ -21,7 +21,10 @@
 use thetahat_numerics::optimize::{Objective, StepRules};
 
 use super::likelihood::{Likelihood, Slopes};
-use crate::model::{GreyBox, equations::Scale};
+use crate::model::{
+    GreyBox,
+    equations::{Scale, Unknown},
+};
 use crate::respond::equations::Failure;
 
 /// -2 ln L as a function of the variables z.
@@ -38,8 +41,8 @@ pub(super) struct Deviance<L> {
 }
 
 impl<L: Likelihood> Deviance<L> {
-    pub(super) fn new(model: &GreyBox, criterion: L) -> Self {
-        Self::of(model.parameters().iter().map(|unknown| unknown.scale != Scale::Free).collect(), criterion)
+    pub(super) fn new(unknown: &[Unknown], criterion: L) -> Self {
+        Self::of(unknown.iter().map(|unknown| unknown.scale != Scale::Free).collect(), criterion)
     }
 
     /// The same of all parameters but one.

@@ -14,11 +14,11 @@ use thetahat_numerics::distribution::two_sided;
 use thetahat_numerics::optimize::{Deadline, Monitor, Search, search};
 
 use super::EquationsEstimate;
-use super::likelihood::{Likelihood, LikelihoodObjective, Slopes};
+use super::likelihood::{Likelihood, Slopes};
 use super::objective::Deviance;
 use crate::Error;
 use crate::model::GreyBox;
-use crate::respond::equations::{Experiment, Failure};
+use crate::respond::equations::Failure;
 
 /// The most doublings of the distance in which an end is looked for: beyond, there is none.
 const DOUBLINGS: usize = 12;
@@ -30,9 +30,9 @@ const LITTLE: f64 = 1e-3;
 
 /// The two ends of the interval of 95 % of each parameter, in its own unit; none where the likelihood falls no further
 /// on that side, be it to a bound. About twenty searches for each parameter.
-pub(crate) fn intervals(
+pub(crate) fn intervals<L: Likelihood>(
     model: &GreyBox,
-    experiments: &[Experiment],
+    criterion: impl Fn() -> L + Sync,
     found: &EquationsEstimate,
     factor: f64,
     options: &Search,
@@ -42,7 +42,7 @@ pub(crate) fn intervals(
     let ends = sides.collect::<Vec<_>>().into_par_iter().map(|(index, side)| {
         let mut profile = Profile {
             model,
-            criterion: Some(LikelihoodObjective::new(model, experiments)),
+            criterion: Some(criterion()),
             index,
             others: found
                 .z
@@ -128,9 +128,9 @@ fn crossing(
 }
 
 /// The likelihood with one parameter held.
-struct Profile<'a> {
+struct Profile<'a, L> {
     model: &'a GreyBox,
-    criterion: Option<LikelihoodObjective<'a>>,
+    criterion: Option<L>,
     index: usize,
     /// Where the others were at their best before.
     others: Vec<f64>,
@@ -138,7 +138,7 @@ struct Profile<'a> {
     monitor: Monitor<'a>,
 }
 
-impl Profile<'_> {
+impl<L: Likelihood> Profile<'_, L> {
     /// -2 ln L, the others at their best; none where the filter does not work.
     fn value(&mut self, z: f64) -> Result<Option<f64>, Error> {
         let Some(criterion) = self.criterion.take() else { return Ok(None) };

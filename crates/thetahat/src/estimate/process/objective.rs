@@ -1,5 +1,6 @@
 //! The errors of a free run as a function of the shapes and dead times.
 
+mod points;
 mod signals;
 
 use std::ops::Range;
@@ -12,6 +13,7 @@ use crate::model::{Parts, ProcessStructure};
 use crate::respond::process::{
     HeldLog, free_sensitivities, modes, response_slopes, responses, run, sensitivities,
 };
+pub(crate) use points::ResponsePoints;
 
 /// Time constants lie between this fraction of the shortest step of the clock, and so many times the longest log.
 const SHORTEST: f64 = 1e-3;
@@ -54,24 +56,6 @@ impl Background {
 
     pub(crate) fn columns(self, held: &[HeldLog], structures: &[ProcessStructure]) -> usize {
         self.offsets() + self.free(held, structures)
-    }
-}
-
-/// Measured points of the frequency response from one input.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ResponsePoints {
-    /// In rad/s, and the points themselves.
-    pub(crate) frequencies: Vec<f64>,
-    pub(crate) values: Vec<[f64; 2]>,
-    /// What each is multiplied by: one over its standard deviation.
-    pub(crate) weights: Vec<f64>,
-    /// How long the input is held, in seconds.
-    pub(crate) sample_time: f64,
-}
-
-impl ResponsePoints {
-    fn measured(&self) -> impl Iterator<Item = f64> {
-        self.values.iter().zip(&self.weights).flat_map(|(value, weight)| value.map(|part| part * weight))
     }
 }
 
@@ -211,9 +195,30 @@ impl<'a> ProcessObjective<'a> {
         }
     }
 
+    /// Whether the errors of points are not known, and taken for relative to these.
+    pub(super) fn is_relative(&self) -> bool {
+        self.points.iter().any(|points| !points.known)
+    }
+
     /// Whether it is of frequency responses.
     pub(super) fn is_of_points(&self) -> bool {
         !self.points.is_empty()
+    }
+
+    /// The sum of rho psi_k psi_l' over the points of each input, of columns of psi at all points
+    /// ([`Correlation::spread`](crate::respond::Correlation::spread)).
+    pub(super) fn spread(&self, psi: &[&Vec<f64>]) -> Vec<f64> {
+        let mut sum = vec![0.0; psi.len() * psi.len()];
+        let mut first = 0;
+        for points in self.points {
+            let rows = (0..points.frequencies.len()).map(|row| first + 2 * row);
+            let slopes: Vec<[f64; 2]> =
+                rows.flat_map(|row| psi.iter().map(move |column| [column[row], column[row + 1]])).collect();
+            let own = points.correlation.spread(&points.frequencies, &slopes, psi.len());
+            sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+            first += 2 * points.frequencies.len();
+        }
+        sum
     }
 
     /// Holds the dead times, and keeps the shapes within a factor of [`NEAR`] of a point of them.
@@ -374,8 +379,7 @@ impl<'a> ProcessObjective<'a> {
     ) -> Vec<Vec<f64>> {
         if self.is_of_points() {
             return self.of_input(input, structure.columns(), |own, columns| {
-                let points = (own.frequencies.as_slice(), own.sample_time);
-                responses(structure, &parts.shape, parts.dead_time, points, |row, re, im| {
+                responses(structure, &parts.shape, parts.dead_time, own.at(), |row, re, im| {
                     for (column, (re, im)) in columns.iter_mut().zip(re.iter().zip(im)) {
                         (column[2 * row], column[2 * row + 1]) = (*re, *im);
                     }
@@ -403,8 +407,7 @@ impl<'a> ProcessObjective<'a> {
         let mut own = vec![0.0; count];
         if self.is_of_points() {
             return self.of_input(input, count, |points, columns| {
-                let at = (points.frequencies.as_slice(), points.sample_time);
-                response_slopes(structure, parts, at, |row, seen, slopes| {
+                response_slopes(structure, parts, points.at(), |row, seen, slopes| {
                     for (side, (seen, slopes)) in seen.into_iter().zip(slopes).enumerate() {
                         let [shape @ .., dead_time] = slopes;
                         write(seen, shape, *dead_time, &mut own);

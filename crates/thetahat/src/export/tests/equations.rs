@@ -83,7 +83,7 @@ const TEXTS: [&str; 3] = [
          v = 'v + dt * (dead(force, -0.2, 0.3) - table(x; -2:-3, -0.2:-1, 0:0, 0.1:k, 0.5:2, 2:2) - 0.4 * v)'
          [outputs]
          y = 'lines(x + v; -0.5:-1, -0.1:k, 0:0, 0.5:1) + sat(v, -0.1, 0.1 within 0.05)'
-         z = 'if v > 0.1 * k then x else if x <= 0 within 0.1 then v else -v'
+         z = 'if v > 0.1 * k and (x < 0.2 or not x < 0.5) then x else if x <= 0 within 0.1 then v else -v'
          [noise]
          process = { v = 0.05 }
          measurement = { y = 0.1, z = 0.1 }",

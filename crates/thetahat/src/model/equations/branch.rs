@@ -1,4 +1,4 @@
-//! Branches, limits and dead zones as nodes of a graph, hard or smooth over a width.
+//! Conditions, branches, limits and dead zones as nodes of a graph, hard or smooth over a width.
 
 use super::graph::{Function, Graph, Node};
 
@@ -9,6 +9,33 @@ pub(super) struct Above {
     pub(super) b: Node,
     /// Whether a = b counts.
     pub(super) or_equal: bool,
+}
+
+/// What a branch asks.
+#[derive(Debug, Clone)]
+pub(super) enum Condition {
+    Above(Above),
+    Not(Box<Condition>),
+    /// All of them hold.
+    Both(Vec<Condition>),
+    /// One of them holds, or more.
+    Either(Vec<Condition>),
+}
+
+/// c where the condition holds, else d: a branch for each comparison,
+///
+/// ```text
+/// if not A then c else d       = if A then d else c
+/// if A and B then c else d     = if A then (if B then c else d) else d
+/// if A or B then c else d      = if A then c else (if B then c else d)
+/// ```
+pub(super) fn chosen(graph: &mut Graph, condition: &Condition, c: Node, d: Node) -> Node {
+    match condition {
+        Condition::Above(above) => branched(graph, *above, None, c, d),
+        Condition::Not(condition) => chosen(graph, condition, d, c),
+        Condition::Both(all) => all.iter().rev().fold(c, |rest, one| chosen(graph, one, rest, d)),
+        Condition::Either(all) => all.iter().rev().fold(d, |rest, one| chosen(graph, one, c, rest)),
+    }
 }
 
 /// c where the comparison holds, else d; with a width w a blend of both,

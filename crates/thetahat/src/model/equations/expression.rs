@@ -1,15 +1,19 @@
 //! Expressions of a model, read into a graph.
 //!
 //! ```text
-//! sum      = product (("+" | "-") product)*
-//! product  = sign (("*" | "/") sign)*
-//! sign     = ("+" | "-") sign | power
-//! power    = operand ("^" sign)?                so that -x^2 = -(x^2) and x^y^z = x^(y^z)
-//! operand  = number | name | function "(" sum ("," sum)* within? ")" | table | branch | delayed | "(" sum ")"
-//! table    = ("table" | "lines") "(" sum ";" sum ":" sum ("," sum ":" sum)* ")"
-//! branch   = "if" sum ("<" | "<=" | ">" | ">=") sum within? "then" sum "else" sum
-//! within   = "within" sum
-//! delayed  = input "(" sum ")"                  where the sum is t less what parameters say
+//! sum        = product (("+" | "-") product)*
+//! product    = sign (("*" | "/") sign)*
+//! sign       = ("+" | "-") sign | power
+//! power      = operand ("^" sign)?              so that -x^2 = -(x^2) and x^y^z = x^(y^z)
+//! operand    = number | name | function "(" sum ("," sum)* within? ")" | table | branch | delayed | "(" sum ")"
+//! table      = ("table" | "lines") "(" sum ";" sum ":" sum ("," sum ":" sum)* ")"
+//! branch     = "if" either "then" sum "else" sum | "if" comparison within "then" sum "else" sum
+//! either     = both ("or" both)*
+//! both       = condition ("and" condition)*
+//! condition  = "not" condition | "(" either ")" | comparison
+//! comparison = sum ("<" | "<=" | ">" | ">=") sum
+//! within     = "within" sum
+//! delayed    = input "(" sum ")"                where the sum is t less what parameters say
 //! ```
 //!
 //! Nothing is stored between text and graph: an operator combines two nodes as soon as both are read. What is nested is
@@ -62,7 +66,7 @@ const FUNCTIONS: [(&str, usize); 23] = [
 pub(super) const CONSTANTS: [&str; 3] = ["pi", "t", "dt"];
 
 /// Words of a branch.
-const WORDS: [&str; 4] = ["if", "then", "else", "within"];
+const WORDS: [&str; 7] = ["if", "then", "else", "within", "and", "or", "not"];
 
 /// Whether a name may not be given to a state, an input or a parameter.
 pub(super) fn is_reserved(name: &str) -> bool {

@@ -4,6 +4,7 @@ use super::document::{Document, Entry, Section, error_at, quoted, suggestion};
 use super::dynamics::{Functions, Step};
 use super::expression::{self, CONSTANTS, Names};
 use super::graph::{Graph, Leaves, Node, Operation};
+use super::linearized::Entrances;
 use super::noise::{Nodes, Noise, Reader};
 use super::parameter::{Given, parameters};
 use super::program::Program;
@@ -135,6 +136,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         && !graph.jumps(&all, is_state)
         && !graph.depends(&noises, is_state);
     let drives = graph.drives();
+    let entrances = Entrances::new(&mut graph, &drives, &rates, &seen);
     let is_linear = |graph: &mut Graph, functions: &[Node], by_states: Vec<Node>| {
         let mut slopes = by_states;
         drives.iter().for_each(|&drive| slopes.extend(graph.derivatives(functions, drive)));
@@ -183,6 +185,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         step,
         transition,
         observation,
+        entrances,
         noise,
         figures,
     })

@@ -2,6 +2,7 @@ mod derivatives;
 mod expressions;
 mod figures;
 mod linear;
+mod linearized;
 mod models;
 mod refusals;
 mod tables;

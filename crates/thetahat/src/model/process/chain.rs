@@ -263,8 +263,13 @@ impl<S: Number<f64>> Chain<S> {
         self.columns(&slope, 0.0)
     }
 
+    /// An entry of [A B].
+    pub(crate) fn entry(&self, row: usize, column: usize) -> S {
+        self.matrix[row][column]
+    }
+
     /// A x + B u.
-    pub(in crate::model) fn slope(&self, state: &State<S>, u: f64) -> State<S> {
+    pub(crate) fn slope(&self, state: &State<S>, u: f64) -> State<S> {
         let mut slope = [S::from(0.0); MOST_STATES];
         for (slope, row) in slope.iter_mut().zip(&self.matrix).take(self.states) {
             *slope = row[self.states] * u;

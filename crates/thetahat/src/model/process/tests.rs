@@ -1,3 +1,5 @@
+use thetahat_core::nalgebra::Complex;
+
 use super::*;
 use crate::data::Offset;
 use crate::respond::process::{response_slopes, responses, run};
@@ -205,7 +207,7 @@ fn frequency_responses_are_those_of_the_polynomials_and_their_slopes_those_of_di
         let response = |values: &[f64]| {
             let parts = structure.taken_apart(values);
             let mut found = Vec::new();
-            responses(&structure, &parts.shape, parts.dead_time, (&frequencies, 0.5), |_, re, im| {
+            responses(&structure, &parts.shape, parts.dead_time, (&frequencies, Some(0.5)), |_, re, im| {
                 let sum =
                     |columns: &[f64]| parts.weights.iter().zip(columns).map(|(w, c)| w * c).sum::<f64>();
                 found.push([sum(re), sum(im)]);
@@ -221,7 +223,7 @@ fn frequency_responses_are_those_of_the_polynomials_and_their_slopes_those_of_di
         }
         let parts = structure.taken_apart(values);
         let mut slopes = vec![0.0; values.len()];
-        response_slopes(&structure, &parts, (&frequencies, 0.5), |row, seen, by| {
+        response_slopes(&structure, &parts, (&frequencies, Some(0.5)), |row, seen, by| {
             for side in 0..2 {
                 let [shape @ .., dead_time] = by[side];
                 structure.own_slopes(&parts, seen[side], shape, *dead_time, &mut slopes);
@@ -233,6 +235,58 @@ fn frequency_responses_are_those_of_the_polynomials_and_their_slopes_those_of_di
                     };
                     let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
                     assert!((slope - difference).abs() < 1e-7, "{word} {place} {row}: {slope} {difference}");
+                }
+            }
+        });
+    }
+}
+
+#[test]
+fn responses_to_sines_are_the_transfer_functions() {
+    type Transfer = fn(Complex<f64>) -> Complex<f64>;
+    let cases: [(&str, &[f64], Transfer); 5] = [
+        ("p2d", &[3.0, 4.0, 2.0, 0.7], |s| (s * -0.7).exp() * 3.0 / ((s * 4.0 + 1.0) * (s * 2.0 + 1.0))),
+        ("p1di", &[0.5, 2.0, 0.3], |s| (s * -0.3).exp() * 0.5 / (s * (s * 2.0 + 1.0))),
+        ("p2uz", &[1.5, 2.0, 0.2, -0.4], |s| (s * -0.4 + 1.0) * 1.5 / (s * 0.2 + s * s / 4.0 + 1.0)),
+        ("rc2", &[0.1, 1.0, 0.5, 2.0, 8.0], |s| (s * 0.5 + 1.0).inv() + (s * 8.0 + 1.0).inv() * 2.0 + 0.1),
+        ("tf22", &[0.3, -1.0, 2.0, 0.4, 5.0], |s| (s * s * 0.3 - s + 2.0) / (s * s + s * 0.4 + 5.0)),
+    ];
+    let frequencies = [0.03, 0.4, 2.0, 60.0];
+    for (word, values, transfer) in cases {
+        let structure: ProcessStructure = word.parse().unwrap();
+        let response = |values: &[f64]| {
+            let parts = structure.taken_apart(values);
+            let mut found = Vec::new();
+            responses(&structure, &parts.shape, parts.dead_time, (&frequencies, None), |_, re, im| {
+                let sum =
+                    |columns: &[f64]| parts.weights.iter().zip(columns).map(|(w, c)| w * c).sum::<f64>();
+                found.push([sum(re), sum(im)]);
+            });
+            found
+        };
+        for (own, frequency) in response(values).iter().zip(frequencies) {
+            let expected = transfer(Complex::new(0.0, frequency));
+            let apart = (own[0] - expected.re).hypot(own[1] - expected.im);
+            assert!(apart < 1e-12 * expected.norm().max(1e-3), "{word} {frequency}: {apart}");
+        }
+        let parts = structure.taken_apart(values);
+        let mut slopes = vec![0.0; values.len()];
+        response_slopes(&structure, &parts, (&frequencies, None), |row, seen, by| {
+            for side in 0..2 {
+                let [shape @ .., dead_time] = by[side];
+                structure.own_slopes(&parts, seen[side], shape, *dead_time, &mut slopes);
+                for (place, slope) in slopes.iter().enumerate() {
+                    let moved = |by: f64| {
+                        let mut values = values.to_vec();
+                        values[place] += by;
+                        response(&values)[row][side]
+                    };
+                    let difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+                    let size = difference.abs().max(1.0);
+                    assert!(
+                        (slope - difference).abs() < 1e-6 * size,
+                        "{word} {place} {row}: {slope} {difference}"
+                    );
                 }
             }
         });

@@ -129,9 +129,13 @@ pub(super) fn procedure(on: &mut Sections, report: &Report) {
         }
         Procedure::FreeRun(found) => free_run(on, found),
         Procedure::FrequencyResponse(found) => on.line(format!(
-            "{} parts of points, missed by {} of their standard deviations in the mean, {}, {}",
+            "{} parts of points, missed by {} in the mean, {}, {}",
             estimation.samples,
-            number(estimation.mse.sqrt()),
+            if found.relative {
+                format!("{} % of their size", short(100.0 * estimation.mse.sqrt()))
+            } else {
+                format!("{} of their standard deviations", number(estimation.mse.sqrt()))
+            },
             counted(found.iterations),
             stopped(found.stopped)
         )),

@@ -6,3 +6,4 @@ mod models;
 mod noise;
 mod recovery;
 mod refusals;
+mod response;

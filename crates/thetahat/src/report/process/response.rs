@@ -8,23 +8,24 @@ use crate::data::Offset;
 use crate::estimate::{Criteria, ResponsePoints, least_response_errors};
 use crate::model::{ProcessModel, Signal};
 use crate::report::Report;
-use crate::report::schema::{Data, Estimation, Missing};
-use crate::respond::FrequencyResponse;
+use crate::report::response::{data, fitted, variance, warnings as of_response};
+use crate::report::schema::Estimation;
+use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::spectrum::MeasuredResponse;
 
-/// Finds the process whose frequency response, with an input that is held from sample to sample, comes closest to a
-/// measured one:
+/// Finds the process whose frequency response, with an input that is held from sample to sample or, of a response in
+/// continuous time, to sines, comes closest to a measured one:
 ///
 /// ```text
 /// min sum_k |G(omega_k) - G_k|^2/var G_k
 /// ```
 ///
 /// with the variances of the points; where a point has none, with |G_k|^2 in their place: errors relative to each
-/// point. Of the plan it takes the inputs, none standing for all of them, the structures and the search. Levels are not
-/// in a response: offsets are zero.
+/// point, as large as they turn out to be. Of the plan it takes the inputs, none standing for all of them, the
+/// structures and the search. Levels are not in a response: offsets are zero.
 ///
-/// Standard errors are those of independent points with these variances, and larger where the response misses the
-/// points by more.
+/// Standard errors are those of points with these variances, of which neighbours are correlated as far as the method
+/// smooths, and larger where the response misses the points by more.
 ///
 /// Source: Pintelon and Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. 2012, section 9.11;
 /// Ljung, System Identification, 2nd ed. 1999, section 7.7.
@@ -95,7 +96,7 @@ pub fn fit_process_to_response(
             "a frequency response has no rows, levels or states; leave it out",
         ));
     }
-    let points: Vec<ResponsePoints> = measured.iter().map(|own| points(own, response.sample_time)).collect();
+    let points: Vec<ResponsePoints> = measured.iter().map(|own| points(own, response)).collect();
     let structures = plan.each();
     let names = ProcessModel::names(&structures, &plan.inputs);
     let found = least_response_errors(&structures, &names, &points, &plan.search, monitor)?;
@@ -104,22 +105,7 @@ pub fn fit_process_to_response(
     let own = model(plan, response.sample_time, inputs, structures, &names, (false, &found))?;
     // What e is in the time of the samples the noise of the response says, if it does.
     let own = ProcessModel { noise_variance: noise(response), degrees_of_freedom: None, ..own };
-    let rows = response.logs.last().map(|log| log.rows).or_else(|| response.rows.last().copied());
-    let missing = plan.inputs.iter().chain([&plan.output]);
-    let data = Data {
-        logs: response.logs.clone(),
-        digests: Vec::new(),
-        rows: rows.map_or(0, |rows| rows.last()),
-        sample_time: response.sample_time,
-        detrend: response.detrend.clone(),
-        prefilter: None,
-        estimation: response.rows.clone(),
-        validation: Vec::new(),
-        split: None,
-        segments: response.rows.clone(),
-        missing: missing.map(|channel| Missing { channel: channel.clone(), rows: 0 }).collect(),
-        time_gaps: 0,
-    };
+    let data = data(response, plan.inputs.iter().chain([&plan.output]).cloned());
     let estimation = Estimation {
         initial: None,
         level: None,
@@ -131,37 +117,25 @@ pub fn fit_process_to_response(
         procedure: found.outcome.of_response(),
     };
     let mut warnings = super::warnings::of_parameters(&own, f64::INFINITY);
-    if response.bands.honest == Some(false) {
-        warnings.push(format!("the bands of the response are not honest: {}", response.bands.reason));
-    }
-    if found.mse > MISSED {
-        warnings.push(format!(
-            "the response is missed by {} times the standard deviations of its points: the structure is not the whole truth, or they are \
-             too small",
-            crate::figures::short((10.0 * found.mse.sqrt()).round() / 10.0)
-        ));
-    }
+    let missed = if points.iter().all(|own| own.known) { found.mse } else { 0.0 };
+    warnings.extend(of_response(response, missed));
     Ok(Report { warnings, ..Report::new(data, own, estimation) })
 }
 
-/// Mean squares above this, in variances of the points, are worth a warning.
-const MISSED: f64 = 2.0;
-
-fn points(response: &FrequencyResponse, sample_time: f64) -> ResponsePoints {
-    let all = response
-        .points
-        .iter()
-        .filter(|point| point.magnitude.value > 0.0 && point.magnitude.value.is_finite());
-    let known = all.clone().all(|point| point.covariance.is_some_and(|[[re, _], [_, im]]| re + im > 0.0));
-    let weight = |point: &crate::respond::FrequencyPoint| match point.covariance {
-        Some([[re, _], [_, im]]) if known => (2.0 / (re + im)).sqrt(),
+fn points(own: &FrequencyResponse, response: &MeasuredResponse) -> ResponsePoints {
+    let known = fitted(own).all(|point| variance(point).is_some());
+    let weight = |point: &FrequencyPoint| match variance(point) {
+        Some(variance) if known => 1.0 / variance.sqrt(),
         _ => 1.0 / point.magnitude.value,
     };
     ResponsePoints {
-        frequencies: all.clone().map(|point| point.frequency).collect(),
-        values: all.clone().map(|point| [point.re, point.im]).collect(),
-        weights: all.map(weight).collect(),
-        sample_time,
+        frequencies: fitted(own).map(|point| point.frequency).collect(),
+        values: fitted(own).map(|point| [point.re, point.im]).collect(),
+        weights: fitted(own).map(weight).collect(),
+        known,
+        sample_time: response.sample_time,
+        held: !response.continuous,
+        correlation: response.correlation(),
     }
 }
 

@@ -1,62 +1,39 @@
-//! The frequency response of a process whose input is held from sample to sample.
+//! The frequency response of a process whose input is held from sample to sample, or is a sine in continuous time.
 //!
-//! With a dead time theta = m T - p, and z = e^(j omega T),
+//! With a dead time theta = m T - p, and z = e^(j omega T), that of an input which is held for T seconds is
 //!
 //! ```text
 //! G(omega) = w'(C (F_p (z I - F)^-1 G + G_p) + D) z^-m,   F = e^(A T),  F_p = e^(A p),  G, G_p the same of a held input
 //! ```
 //!
-//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). It is solved in the states:
-//! polynomials of a process that is slow beside its samples lose digits near z = 1.
+//! (Åström and Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3), and that to a sine
+//!
+//! ```text
+//! G(omega) = w'(C (j omega I - A)^-1 B + D) e^(-j omega theta)
+//! ```
+//!
+//! Both are solved in the states: polynomials of a process that is slow beside its samples lose digits near z = 1.
 
 use thetahat_core::{Dual, Number};
 
 use super::held::LANE;
-use crate::model::{Columns, Parts, ProcessStructure, State};
+use crate::model::{Chain, Columns, Complex, Parts, ProcessStructure, State, Transition, resolved};
 
 /// The lags of a structure at most, and a dead time.
 const SLOPES: usize = LANE + 1;
 
-/// A complex number of numbers that have derivatives.
-#[derive(Debug, Clone, Copy)]
-struct Complex<S> {
-    re: S,
-    im: S,
-}
+/// Frequencies in rad/s, and for how many seconds the input is held; none for sines in continuous time.
+pub(crate) type Points<'a> = (&'a [f64], Option<f64>);
 
-impl<S: Number<f64>> Complex<S> {
-    fn new(re: f64, im: f64) -> Self {
-        Self { re: re.into(), im: im.into() }
-    }
-
-    fn times(self, other: Self) -> Self {
-        Self { re: self.re * other.re - self.im * other.im, im: self.re * other.im + self.im * other.re }
-    }
-
-    fn minus(self, other: Self) -> Self {
-        Self { re: self.re - other.re, im: self.im - other.im }
-    }
-
-    fn over(self, other: Self) -> Self {
-        let square = other.re * other.re + other.im * other.im;
-        let product = self.times(Self { re: other.re, im: -other.im });
-        Self { re: product.re / square, im: product.im / square }
-    }
-
-    fn size(self) -> f64 {
-        self.re.value().hypot(self.im.value())
-    }
-}
-
-/// Calls `take` for each frequency, in rad/s, with the real and the imaginary part of each column for a sample time.
+/// Calls `take` for each frequency with the real and the imaginary part of each column.
 pub(crate) fn responses(
     structure: &ProcessStructure,
     shape: &[f64],
     dead_time: f64,
-    (frequencies, time): (&[f64], f64),
+    points: Points<'_>,
     take: impl FnMut(usize, &Columns<f64>, &Columns<f64>),
 ) {
-    columns(structure, shape, dead_time, (frequencies, time), take);
+    columns(structure, shape, dead_time, points, take);
 }
 
 /// Calls `take` for each frequency with the columns, and with the slopes of their sum by the shape and, last, by the
@@ -64,7 +41,7 @@ pub(crate) fn responses(
 pub(crate) fn response_slopes(
     structure: &ProcessStructure,
     parts: &Parts<f64>,
-    points: (&[f64], f64),
+    points: Points<'_>,
     mut take: impl FnMut(usize, [&Columns<f64>; 2], [&[f64; SLOPES]; 2]),
 ) {
     let mut values = [0.0; SLOPES];
@@ -89,58 +66,70 @@ fn columns<S: Number<f64>>(
     structure: &ProcessStructure,
     shape: &[S],
     dead_time: S,
-    (frequencies, time): (&[f64], f64),
+    (frequencies, hold): Points<'_>,
     mut take: impl FnMut(usize, &Columns<S>, &Columns<S>),
 ) {
     let chain = structure.chain(shape);
     let n = chain.states();
-    let samples = (dead_time.value() / time).ceil();
-    let ahead = S::from(samples * time) - dead_time;
-    let (whole, part) = (chain.transition(time.into()), chain.transition(ahead));
+    let held = hold.map(|time| Held::new(&chain, dead_time, time));
     let rest = chain.at_rest(0.0, 0.0);
-    let (driven, direct) = (whole.apply(&rest, 1.0), part.apply(&rest, 1.0));
-    for (row, frequency) in frequencies.iter().enumerate() {
-        let (sine, cosine) = (frequency * time).sin_cos();
-        // (z I - F) x = G, by elimination with the largest pivot.
-        let mut matrix: Vec<Vec<Complex<S>>> = (0..n)
-            .map(|i| {
-                let entry = |j: usize| {
-                    let own = Complex { re: whole.entry(i, j), im: S::from(0.0) };
-                    let z = if i == j { Complex::new(cosine, sine) } else { Complex::new(0.0, 0.0) };
-                    z.minus(own)
-                };
-                (0..n).map(entry).chain([Complex { re: driven[i], im: S::from(0.0) }]).collect()
-            })
-            .collect();
-        for step in 0..n {
-            let pivot = (step..n).max_by(|&i, &j| matrix[i][step].size().total_cmp(&matrix[j][step].size()));
-            matrix.swap(step, pivot.unwrap_or(step));
-            let (above, below) = matrix.split_at_mut(step + 1);
-            let own = &above[step];
-            for row in below {
-                let factor = row[step].over(own[step]);
-                for (entry, own) in row.iter_mut().zip(own).skip(step) {
-                    *entry = entry.minus(factor.times(*own));
-                }
+    let driven = held.as_ref().map_or_else(|| chain.slope(&rest, 1.0), |held| held.whole.apply(&rest, 1.0));
+    for (row, &frequency) in frequencies.iter().enumerate() {
+        // z and F of a held input, j omega and A of a sine.
+        let point: Complex<S> = match &held {
+            Some(held) => {
+                let (sine, cosine) = (frequency * held.time).sin_cos();
+                Complex::new(cosine, sine)
             }
+            None => Complex::new(0.0, frequency),
+        };
+        let entry = |i: usize, j: usize| match &held {
+            Some(held) => held.whole.entry(i, j),
+            None => chain.entry(i, j),
+        };
+        let (mut re, mut im) = (rest, rest);
+        let solved = resolved(n, point, entry, |i| driven[i]);
+        for ((re, im), value) in re.iter_mut().zip(&mut im).zip(solved) {
+            (*re, *im) = (value.re, value.im);
         }
-        let (mut re, mut im): (State<S>, State<S>) = (rest, rest);
-        for i in (0..n).rev() {
-            let mut value = matrix[i][n];
-            for j in i + 1..n {
-                value = value.minus(matrix[i][j].times(Complex { re: re[j], im: im[j] }));
+        let late = match &held {
+            Some(held) => {
+                (re, im) = held.later(&rest, (&re, &im));
+                let (sine, cosine) = (-held.samples * frequency * held.time).sin_cos();
+                Complex::new(cosine, sine)
             }
-            let value = value.over(matrix[i][i]);
-            (re[i], im[i]) = (value.re, value.im);
-        }
-        let (mut real, imaginary) = (part.apply(&re, 0.0), part.apply(&im, 0.0));
-        real.iter_mut().zip(direct).for_each(|(value, direct)| *value += direct);
-        let (mut re, mut im) = (chain.columns(&real, 1.0), chain.columns(&imaginary, 0.0));
-        let (sine, cosine) = (-samples * frequency * time).sin_cos();
+            None => Complex::turned(-(dead_time * frequency)),
+        };
+        let (mut re, mut im) = (chain.columns(&re, 1.0), chain.columns(&im, 0.0));
         for (re, im) in re.iter_mut().zip(&mut im) {
-            let turned = Complex { re: *re, im: *im }.times(Complex::new(cosine, sine));
+            let turned = Complex { re: *re, im: *im }.times(late);
             (*re, *im) = (turned.re, turned.im);
         }
         take(row, &re, &im);
+    }
+}
+
+/// The states in samples of a held input, with a dead time that is `samples` of them less a part of one.
+struct Held<S> {
+    time: f64,
+    samples: f64,
+    /// F, and F_p.
+    whole: Transition<S>,
+    part: Transition<S>,
+}
+
+impl<S: Number<f64>> Held<S> {
+    fn new(chain: &Chain<S>, dead_time: S, time: f64) -> Self {
+        let samples = (dead_time.value() / time).ceil();
+        let ahead = S::from(samples * time) - dead_time;
+        Self { time, samples, whole: chain.transition(time.into()), part: chain.transition(ahead) }
+    }
+
+    /// F_p x + G_p.
+    fn later(&self, rest: &State<S>, (re, im): (&State<S>, &State<S>)) -> (State<S>, State<S>) {
+        let (mut real, imaginary) = (self.part.apply(re, 0.0), self.part.apply(im, 0.0));
+        let direct = self.part.apply(rest, 1.0);
+        real.iter_mut().zip(direct).for_each(|(value, direct)| *value += direct);
+        (real, imaginary)
     }
 }

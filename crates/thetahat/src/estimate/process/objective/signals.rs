@@ -20,8 +20,7 @@ impl ProcessObjective<'_> {
         if self.is_of_points() {
             let points = &self.points[input];
             let mut own = vec![0.0; 2 * points.frequencies.len()];
-            let at = (points.frequencies.as_slice(), points.sample_time);
-            responses(structure, &parts.shape, parts.dead_time, at, |row, re, im| {
+            responses(structure, &parts.shape, parts.dead_time, points.at(), |row, re, im| {
                 (own[2 * row], own[2 * row + 1]) = (weighted(re), weighted(im));
             });
             return vec![own];

@@ -3,7 +3,7 @@
 use winnow::error::ErrMode;
 use winnow::stream::{Location, Stream};
 
-use super::super::branch::{self, Above};
+use super::super::branch::{self, Above, Condition};
 use super::super::document::quoted;
 use super::super::graph::{Function, Node, Operation};
 use super::super::interpolation::{Shape, interpolated};
@@ -12,8 +12,7 @@ use super::{
 };
 
 /// What to say of a comparison that is no condition.
-pub(super) const STRAY_COMPARISON: &str =
-    "a comparison stands only after 'if', without parentheses around it: if a > b then c else d";
+pub(super) const STRAY_COMPARISON: &str = "a comparison stands only after 'if': if a > b then c else d";
 
 fn wrong(offset: usize, message: impl Into<String>) -> ErrMode<Fault> {
     ErrMode::Cut(Fault { offset, message: message.into() })
@@ -78,6 +77,85 @@ pub(super) fn delayed(input: &mut Input<'_, '_>, name: &str, place: usize) -> An
 /// A branch after its `if`.
 pub(super) fn branch(input: &mut Input<'_, '_>) -> Answer<Node> {
     descend(input)?;
+    let condition = either(input)?;
+    let width = within(input)?;
+    if let (Some((start, _)), Condition::Not(_) | Condition::Both(_) | Condition::Either(_)) =
+        (width, &condition)
+    {
+        let message = "'within' goes with a single comparison: with 'and', 'or' and 'not' there is no one distance from the \
+                       border; nest branches that have a width each, or leave it out";
+        return Err(wrong(start, message));
+    }
+    expect(input, "then")?;
+    let yes = sum(input).map_err(cut)?;
+    expect(input, "else")?;
+    let no = sum(input).map_err(cut)?;
+    let graph = &mut *input.state.graph;
+    let node = match (&condition, width) {
+        (Condition::Above(above), Some((_, width))) => branch::branched(graph, *above, Some(width), yes, no),
+        _ => branch::chosen(graph, &condition, yes, no),
+    };
+    ascend(input, node)
+}
+
+/// Such as a > b or c > d and not e > f: 'not' binds closest, then 'and'.
+fn either(input: &mut Input<'_, '_>) -> Answer<Condition> {
+    joined(input, "or", Condition::Either, |input| joined(input, "and", Condition::Both, condition))
+}
+
+/// One condition, or several with a word between them.
+fn joined(
+    input: &mut Input<'_, '_>,
+    between: &str,
+    of: fn(Vec<Condition>) -> Condition,
+    each: fn(&mut Input<'_, '_>) -> Answer<Condition>,
+) -> Answer<Condition> {
+    let first = each(input)?;
+    if !word_taken(input, between) {
+        return Ok(first);
+    }
+    let mut all = vec![first, each(input)?];
+    while word_taken(input, between) {
+        all.push(each(input)?);
+    }
+    Ok(of(all))
+}
+
+/// A comparison, what is in parentheses, or what does not hold.
+fn condition(input: &mut Input<'_, '_>) -> Answer<Condition> {
+    if word_taken(input, "not") {
+        descend(input)?;
+        let inner = condition(input)?;
+        return ascend(input, Condition::Not(Box::new(inner)));
+    }
+    let opened = place(input);
+    if !holds_a_condition(rest(input)) {
+        return comparison(input).map(Condition::Above);
+    }
+    input.input.next_slice(1);
+    descend(input)?;
+    let inner = either(input)?;
+    close(input, opened)?;
+    ascend(input, inner)
+}
+
+/// Whether a '(' begins a condition and not a sum: by what follows its ')'.
+fn holds_a_condition(text: &str) -> bool {
+    if !text.starts_with('(') {
+        return false;
+    }
+    let mut depth = 0_usize;
+    let end = text.char_indices().find(|(_, letter)| {
+        depth = depth + usize::from(*letter == '(') - usize::from(*letter == ')');
+        depth == 0
+    });
+    let after = end.and_then(|(end, _)| text.get(end + 1..)).map(str::trim_start);
+    after
+        .is_some_and(|after| after.starts_with(')') || ["and", "or", "then", "within"].contains(&word(after)))
+}
+
+/// Such as a > b.
+fn comparison(input: &mut Input<'_, '_>) -> Answer<Above> {
     let one = sum(input).map_err(cut)?;
     let at = place(input);
     let sign = rest(input).chars().next();
@@ -95,14 +173,8 @@ pub(super) fn branch(input: &mut Input<'_, '_>) -> Answer<Node> {
         input.input.next_slice(1);
     }
     let other = sum(input).map_err(cut)?;
-    let width = within(input)?.map(|(_, width)| width);
-    expect(input, "then")?;
-    let yes = sum(input).map_err(cut)?;
-    expect(input, "else")?;
-    let no = sum(input).map_err(cut)?;
     let (a, b) = if sign == '>' { (one, other) } else { (other, one) };
-    let node = branch::branched(input.state.graph, Above { a, b, or_equal }, width, yes, no);
-    ascend(input, node)
+    Ok(Above { a, b, or_equal })
 }
 
 /// Takes a word of a branch.
@@ -113,7 +185,9 @@ fn expect(input: &mut Input<'_, '_>, wanted: &str) -> Answer<()> {
     let text = rest(input);
     let found = match text.chars().next() {
         None => "the expression ends".to_owned(),
-        Some('<' | '>' | '=') => "there is one comparison in a branch, but here".to_owned(),
+        Some('<' | '>' | '=') => {
+            "one comparison follows another: join them, as in a < b and b < c".to_owned()
+        }
         Some(_) => format!("here is {}", quoted(word(text))),
     };
     let form = "if a > b then c else d";

@@ -229,7 +229,7 @@ fn substeps_are_a_whole_number() {
 #[test]
 fn no_text_is_a_panic() {
     let pieces: Vec<&str> =
-        "( ) + - * / ^ , . = [ ] { } ' \" \\ # \n 0 1e9 x dt t pi sin( max( µ … 'x' = [[ ]] inf nan true if then else within < >= ; : table( 'if x > 0 then lines(x; 0:1 , 1:2) else dead( sat("
+        "( ) + - * / ^ , . = [ ] { } ' \" \\ # \n 0 1e9 x dt t pi sin( max( µ … 'x' = [[ ]] inf nan true if then else within and or not < >= ; : table( 'if x > 0 then lines(x; 0:1 , 1:2) else dead( sat("
             .split(' ')
             .collect();
     let mut random = oorandom::Rand32::new(7);

@@ -115,6 +115,7 @@ fn derivatives_of_tables_and_branches_are_exact() {
         "if x < y within a then sin(x) else 2 * y",
         "max(x, y within 0.1) - min(x * a, y within a)",
         "abs(x - y within 0.2)",
+        "if x > y or not (x > a and y > a) then x^2 else y * a * x",
         "sat(x, -a, a) + sat(y, 0, 2) + sat(x, 1, 2)",
         "dead(x, -a, a) + dead(y, 0, 2) + dead(x, 1, 2)",
         "sat(x, -a, a within 0.1) * dead(y, a, 2 * a within 0.2)",
@@ -155,7 +156,25 @@ fn branches_take_the_side_that_holds() {
         ("2 * (if x > 1 then y else 0) + 1", 7.0),
         ("1 + if x > 1 then y else 0 + 10", 4.0),
         ("if(x+1)*2>5 then 1 else 2", 1.0),
+        ("if (x > 1) then 1 else 2", 1.0),
+        ("if x > 1 and y > 5 then 1 else 2", 2.0),
+        ("if x > 1 or y > 5 then 1 else 2", 1.0),
+        ("if not x > 1 then 1 else 2", 2.0),
+        ("if not not x > 1 then 1 else 2", 1.0),
+        // 'and' binds closer than 'or', and 'not' closest.
+        ("if x > 1 or y > 5 and y > 9 then 1 else 2", 1.0),
+        ("if (x > 1 or y > 5) and y > 9 then 1 else 2", 2.0),
+        ("if not x > 5 and y > 5 then 1 else 2", 2.0),
+        ("if not (x > 5 and y > 5) then 1 else 2", 1.0),
+        ("if 1 < x and x < y and y < 4 then 1 else 2", 1.0),
+        ("if 1 < x and x < y and y < 3 then 1 else 2", 2.0),
+        ("if x > 9 or y > 9 or a > 0 then 1 else 2", 1.0),
+        ("if ((x + 1) * 2 > 5 and (y) > (2)) then 1 else 2", 1.0),
+        ("if ((x) + 1) > 5 or (x - y) < 0 then 1 else 2", 1.0),
+        ("if ((x > 1)) and ((x) > 1) then 1 else 2", 1.0),
+        ("if x > 1 and y > 2 then if x > y or a > 1 then 1 else 7 else 2", 7.0),
         // Only the side that is taken counts.
+        ("if x > 3 and y > 1 then sqrt(1 - x) else 4", 4.0),
         ("if x > 3 then sqrt(1 - x) else 4", 4.0),
         ("sat(x, -1, 1) + sat(-x, -1, 1)", 0.0),
         ("sat(a, -1, 1)", 0.5),
@@ -195,11 +214,19 @@ fn what_is_wrong_with_tables_and_branches_is_said_at_its_place() {
         ("x; y", 1, "this stands outside of a table's knots"),
         ("x > y", 2, "a comparison stands only after 'if'"),
         ("(x > y) * 2", 3, "a comparison stands only after 'if'"),
-        ("if (x > y) then 1 else 2", 6, "without parentheses around it: if a > b then c else d"),
+        ("if (x) then 1 else 2", 5, "a comparison must stand here, one of < <= > >="),
+        ("if (x > y then 1 else 2", 6, "a comparison stands only after 'if'"),
+        ("if x > y and then 1 else 2", 13, "must stand here, not 'then'"),
+        ("if x > y and a then 1 else 2", 15, "a comparison must stand here, one of < <= > >="),
+        ("if and x > y then 1 else 2", 3, "must stand here, not 'and'"),
+        ("if x > y or not then 1 else 2", 16, "must stand here, not 'then'"),
+        ("x and y", 2, "an operator (+ - * / ^) is missing before 'and'"),
+        ("if x > y and y > a within 0.1 then 1 else 2", 19, "'within' goes with a single comparison"),
+        ("if not x > y within 0.1 then 1 else 2", 13, "'within' goes with a single comparison"),
         ("if x then 1 else 2", 5, "a comparison must stand here, one of < <= > >="),
         ("if x == y then 1 else 2", 5, "hardly ever equal"),
         ("if x > y 1", 9, "'then' is missing, here is '1'"),
-        ("if 0 < x < y then 1 else 2", 9, "there is one comparison in a branch"),
+        ("if 0 < x < y then 1 else 2", 9, "one comparison follows another: join them, as in a < b and b < c"),
         ("if x > y then 1", 15, "'else' is missing, the expression ends"),
         ("if x > then 1", 7, "must stand here, not 'then'"),
         ("if x > y within 0 then 1 else 2", 16, "a width must be above 0"),
@@ -231,6 +258,12 @@ fn branches_that_are_nested_do_not_use_up_the_stack() {
         assert!(value(&made(90)).is_ok(), "{open}");
     }
     assert!(fault(&"if x > 0 then 1 else ".repeat(10_000)).1.contains("nested more than 100 deep"));
+    for nested in ["not ", "("] {
+        let text = format!("if {}x > 0{} then 1 else 2", nested.repeat(10_000), ")".repeat(10_000));
+        assert!(fault(&text).1.contains("nested more than 100 deep"), "{nested}");
+    }
+    let long = format!("if x > 0{} then 1 else 2", " and x > 1".repeat(10_000));
+    assert_eq!(value(&long).unwrap(), 1.0);
 }
 
 #[test]

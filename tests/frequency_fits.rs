@@ -219,3 +219,40 @@ fn a_model_in_continuous_time_lies_over_the_table() {
     });
     assert_eq!((csv.lines().count(), far.count()), (51, 0), "{csv}");
 }
+
+#[test]
+fn state_space_of_a_table_and_of_the_document_of_a_log() {
+    let folder = Folder::new();
+    folder.write("z.csv", impedance());
+    let report = folder.fit("--from z.csv --model ss --order 1..6");
+    assert_eq!(report["model"]["kind"], "continuous-state-space");
+    let poles: Vec<f64> = report["model"]["poles"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|pole| pole["re"].as_f64().unwrap())
+        .collect();
+    near(-1.0 / poles[0], 0.05, 1e-6);
+    near(-1.0 / poles[1], 8.0, 1e-3);
+    assert_eq!(poles.len(), 2);
+    let run = folder.done("fit --from z.csv --model ss --order 2 --feedthrough yes --report model.json");
+    assert!(run.stdout.contains("inputs act at once, as asked for"), "{}", run.stdout);
+    folder.done("bode model.json --over z.csv -o over.csv");
+    folder.done("convert model.json --sample-time 0.01 --report sampled.json");
+    for (line, words) in [
+        ("--order 200", "too few for a model of order 200"),
+        ("--order 0", "from 1 on"),
+        ("--order 2 --nk 1", "a response in continuous time has no samples"),
+        ("--order 2 --past 3", "--past: does not work with --from with --model ss"),
+        ("--order 2 --estimate 1..5", "--estimate"),
+        ("--order 2 -u other -y other", "'other' is the input already"),
+    ] {
+        refused(&folder, &format!("fit --from z.csv --model ss {line} --report r.json"), None, words);
+    }
+    folder.write("z.csv", "f,re,im\n1,2,3\n");
+    refused(&folder, "fit --from z.csv --model ss --report r.json", Some(4), "give more points");
+    // Resistance alone: no pole is told from nothing.
+    let constant: String = (1..40).map(|row| format!("{row},5,0\n")).collect();
+    folder.write("z.csv", format!("f,re,im\n{constant}"));
+    folder.done("fit --from z.csv --model ss --order 1 --feedthrough yes");
+}

@@ -14,9 +14,10 @@ pub(crate) struct FitArguments {
     /// The logs: CSV files, gzip-compressed or not, Parquet or Arrow files, or logs of flights (- for standard input)
     #[arg(value_name = "LOG", required_unless_present_any = ["from", "list", "grey"])]
     pub(crate) logs: Vec<PathBuf>,
-    /// Fit a process (--structure, --np) or equations (--grey) to a frequency response instead of logs: the document
-    /// that spectrum wrote (- for standard input), or a table of points in continuous time, such as an impedance
-    /// spectrum with columns of frequency in Hz and real and imaginary part, or magnitude and phase (--columns)
+    /// Fit a process (--structure, --np), a model in state space (--model ss) or equations (--grey) to a frequency
+    /// response instead of logs: the document that spectrum wrote (- for standard input), or a table of points in
+    /// continuous time, such as an impedance spectrum with columns of frequency in Hz and real and imaginary part, or
+    /// magnitude and phase (--columns)
     #[arg(
         long,
         value_name = "RESPONSE",

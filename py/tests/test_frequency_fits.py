@@ -111,3 +111,26 @@ def test_what_a_response_cannot_say_is_refused() -> None:
     both["outputs"] = {"voltage": "(r0 + rest) * i + fast + slow"}
     with pytest.raises(th.EstimationError, match="'r0' and 'rest'"):
         th.grey(response, both)
+
+
+def test_a_state_space_model_of_a_response_is_the_truth() -> None:
+    response = given(impedance(1e-5), standard_deviations=np.full(60, 1e-5))
+    model = th.ss(response)
+    assert model.kind == "continuous-state-space" and model.order == 2
+    taus = sorted(-1 / model.poles().real)
+    np.testing.assert_allclose(taus, [TRUTH["tau1"], TRUTH["tau2"]], rtol=0.01)
+    gain, error = model.dc_gain()
+    assert abs(gain - 0.065) < 4 * error < 1e-3
+    with pytest.raises(ValueError, match="weighting"):
+        th.ss(response, 2, weighting="cva")
+    with pytest.raises(ValueError, match="nk"):
+        th.ss(response, 2, nk=1)
+    rng = np.random.default_rng(3)
+    u, x = rng.normal(size=3000), np.zeros((3001, 2))
+    for k in range(3000):
+        x[k + 1] = [1.6 * x[k, 0] - 0.8 * x[k, 1] + 0.2 * u[k], x[k, 0]]
+    log = th.Log(x[:-1, 0] + 0.1 * rng.normal(size=3000), u, sample_time=0.1)
+    sampled = th.ss(th.spectrum(log), 2)
+    pole = sampled.poles()[0]
+    assert sampled.kind == "state-space" and abs(pole - (0.8 + 0.4j)) < 0.01
+    assert sampled.fit is None or sampled.to_state_space().H.shape == (1, 2)

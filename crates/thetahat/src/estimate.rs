@@ -13,7 +13,7 @@
 //!   [`Constant`] says whether the level of the output is estimated too.
 //! - [`Procedure`] says how an estimate was found: by a [`Solver`], or with a [`SearchOutcome`] ([`StartOutcome`]),
 //!   [`ConvexOutcome`], [`RobustOutcome`], [`LikelihoodOutcome`], [`EquationsOutcome`] (with [`ProfileInterval`]s),
-//!   [`SubspaceOutcome`] (with a
+//!   [`SharedPolesOutcome`], [`SubspaceOutcome`] (with a
 //!   [`RefinementOutcome`] where it was followed by a search for what [`Refine`] says), [`VectorArxOutcome`] (of
 //!   [`VectorArxOptions`] with [`VectorArxInputs`] and a [`Coupling`]; a [`VectorArxScore`] for each model) or
 //!   [`MapsOutcome`] (for each output a [`TermsOutcome`]: a path of [`TermStep`]s with their [`RunFigures`]).
@@ -64,6 +64,7 @@ mod refinement;
 mod reflection;
 mod restart;
 mod robust;
+mod shared_poles;
 mod stability_boundary;
 mod start;
 mod subspace;
@@ -115,6 +116,8 @@ pub(crate) use process::{
 pub use refinement::{Refine, RefinementOutcome};
 pub(crate) use refinement::{Refinement, RefinementStart, refined};
 pub use robust::{Loss, Robust, RobustOutcome};
+pub use shared_poles::SharedPolesOutcome;
+pub(crate) use shared_poles::{SharedPoles, shared_poles};
 pub use subspace::{OrderScore, Subspace, SubspaceOptions, SubspaceOutcome, Weighting, subspace};
 pub(crate) use subspace::{
     Ordered, SegmentStart, SubspaceErrors, SubspaceSums, joint_products, joint_taps, products_of_innovations,
@@ -179,6 +182,8 @@ pub enum Procedure {
     FrequencyResponse(ProcessOutcome),
     /// By a subspace method: the states first, then the matrices.
     Subspace(SubspaceOutcome),
+    /// By a search for the least errors of the frequency response of a state-space model.
+    SharedPoles(SharedPolesOutcome),
     /// Of several outputs at once, by least squares: A(q) y = B(q) u + e with matrices for coefficients.
     VectorArx(VectorArxOutcome),
     /// Not at all: the numbers of the model were given.

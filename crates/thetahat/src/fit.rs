@@ -24,8 +24,7 @@ use crate::model::GreyBox;
 use crate::options::{ColumnName, Kind};
 use crate::plan::{FitOptions, Fitted};
 use crate::report::{
-    EquationsPlan, NormalEquations, PendingEvaluation, Plan, ProcessPlan, Report, fit_equations,
-    fit_equations_to_response, fit_process_to_response,
+    EquationsPlan, NormalEquations, PendingEvaluation, Plan, Report, fit_equations, fit_equations_to_response,
 };
 use crate::spectrum::MeasuredResponse;
 use arima::ArimaDraft;
@@ -102,11 +101,6 @@ trait Draft: fmt::Debug + Send + Sync {
     fn of_equations(&self) -> Option<&EquationsPlan> {
         None
     }
-
-    /// What is asked of a process, which a frequency response can say too; none of other kinds.
-    fn of_response(&self) -> Option<&ProcessPlan> {
-        None
-    }
 }
 
 /// A fit of one kind of model of which everything is said.
@@ -139,6 +133,11 @@ trait KindPlan: fmt::Debug + Send + Sync {
         Err(whole_log())
     }
 
+    /// Fits the model to a frequency response.
+    fn fit_response(&self, _response: &MeasuredResponse, _monitor: Monitor<'_>) -> Result<Report, Error> {
+        Err(Error::argument("from", "the options ask for a kind of model that no frequency response tells"))
+    }
+
     /// It, if it is of a model of polynomials.
     fn polynomial(&self) -> Option<&Plan> {
         None
@@ -159,8 +158,9 @@ impl FitDraft {
         let draft: Box<dyn Draft> = match options.kind(fitted)?.kind {
             Kind::POLYNOMIAL | Kind::IMPULSE_RESPONSE => Box::new(PolynomialDraft::new(options)?),
             Kind::ARIMA => Box::new(ArimaDraft::new(options)?),
-            Kind::STATE_SPACE => Box::new(StateSpaceDraft::new(options, false)?),
-            Kind::VECTOR_ARX => Box::new(StateSpaceDraft::new(options, true)?),
+            kind @ (Kind::STATE_SPACE | Kind::VECTOR_ARX | Kind::RESPONSE_STATES) => {
+                Box::new(StateSpaceDraft::new(options, kind)?)
+            }
             Kind::PROCESS | Kind::RESPONSE => Box::new(ProcessDraft::new(options, fitted)?),
             Kind::NONLINEAR_ARX => Box::new(NonlinearArxDraft::new(options)?),
             Kind::EQUATIONS => Box::new(equations(options)?),
@@ -251,19 +251,21 @@ impl FitDraft {
         plan.ok_or_else(|| Error::argument("grey", "the options ask for another kind of model"))
     }
 
-    /// Fits a process to a frequency response.
+    /// Fits a process or a model in state space to a frequency response, from all its inputs if none are named.
     ///
     /// # Errors
-    /// As for [`fit_process_to_response`]; [`Error::Argument`] for options of another kind of model.
+    /// As for [`fit_process_to_response`](crate::report::fit_process_to_response) and
+    /// [`fit_states_to_response`](crate::report::fit_states_to_response); [`Error::Argument`] for options of another
+    /// kind of model.
     pub fn fit_response(self, response: &MeasuredResponse, monitor: Monitor<'_>) -> Result<Report, Error> {
-        let Some(plan) = self.draft.of_response() else {
-            return Err(Error::argument("from", "the options ask for another kind of model than a process"));
-        };
         if let Some(other) = self.options.output.iter().find(|output| output.0 != response.output) {
             let message = format!("the response is of '{}', not of '{}'", response.output, other.0);
             return Err(Error::argument("output", message));
         }
-        let report = fit_process_to_response(response, plan, monitor)?;
+        let all = || response.responses.iter().filter_map(|own| own.input.clone()).collect();
+        let inputs = self.options.inputs().unwrap_or_else(all);
+        let plan = self.draft.plan(inputs, vec![response.output.clone()])?;
+        let report = plan.fit_response(response, monitor)?;
         Ok(Report { plan: Some(self.options), ..report })
     }
 }

@@ -70,4 +70,6 @@ pub use state_space::{
     ContinuousStateSpace, ContinuousStateSpaceModel, Entry, EntryCovariance, Hold, Reduced, StateSpace,
     StateSpaceMatrix, StateSpaceModel, ZerosPolesGain,
 };
-pub(crate) use state_space::{Path, Sizes, across_coordinates, flat, is_stable, riccati, symmetric_eigen};
+pub(crate) use state_space::{
+    Path, Sizes, across_coordinates, eigenvalues, flat, is_stable, riccati, symmetric_eigen,
+};

@@ -91,7 +91,7 @@ pub use process::{ProcessPlan, fit_process, fit_process_to_response};
 pub use requirement::{Demand, Requirement};
 pub use sample::sample;
 pub use schema::{Data, Estimation, Missing, Parts, Report};
-pub use state_space::{StateSpacePlan, fit_state_space, fit_state_space_monitored};
+pub use state_space::{StateSpacePlan, fit_state_space, fit_state_space_monitored, fit_states_to_response};
 pub(crate) use suited::{SAME_TIME, check_sample_time};
 pub use validation::{
     Comparison, Coverage, InSample, LikelihoodRatio, NoiseLevel, Offsets, OutputSignals, Signals, Validated,

@@ -2,7 +2,7 @@
 
 use super::{
     ConvexOutcome, EquationsOutcome, LikelihoodOutcome, MapsOutcome, Procedure, ProcessOutcome,
-    RegularisedOutcome, SearchOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
+    RegularisedOutcome, SearchOutcome, SharedPolesOutcome, SubspaceOutcome, TermsOutcome, VectorArxOutcome,
 };
 
 /// Which distribution the tests of residuals have where the model is right.
@@ -47,6 +47,7 @@ impl Procedure {
             | Self::Training(_)
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
+            | Self::SharedPoles(_)
             | Self::Subspace(_)
             | Self::VectorArx(_)
             | Self::Given => NullDistribution::Known,
@@ -72,6 +73,7 @@ impl Procedure {
             | Self::Training(_)
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
+            | Self::SharedPoles(_)
             | Self::Subspace(_)
             | Self::VectorArx(_)
             | Self::Given => FilteredCovariance::Unknown,
@@ -111,6 +113,7 @@ impl Procedure {
             | Self::Training(_)
             | Self::FreeRun(_)
             | Self::FrequencyResponse(_)
+            | Self::SharedPoles(_)
             | Self::Subspace(_)
             | Self::VectorArx(_)
             | Self::Given => None,
@@ -168,6 +171,11 @@ impl Procedure {
         if let Self::Subspace(outcome) = self { Some(outcome) } else { None }
     }
 
+    /// How a state-space model was found from a measured frequency response.
+    pub fn shared_poles(&self) -> Option<&SharedPolesOutcome> {
+        if let Self::SharedPoles(outcome) = self { Some(outcome) } else { None }
+    }
+
     /// How an ARX model of several outputs was found.
     pub fn vector_arx(&self) -> Option<&VectorArxOutcome> {
         if let Self::VectorArx(outcome) = self { Some(outcome) } else { None }
@@ -201,6 +209,12 @@ impl From<EquationsOutcome> for Procedure {
 impl From<SubspaceOutcome> for Procedure {
     fn from(outcome: SubspaceOutcome) -> Self {
         Self::Subspace(outcome)
+    }
+}
+
+impl From<SharedPolesOutcome> for Procedure {
+    fn from(outcome: SharedPolesOutcome) -> Self {
+        Self::SharedPoles(outcome)
     }
 }
 

@@ -11,7 +11,8 @@ use crate::data::{Log, Source};
 use crate::estimate::Initial;
 use crate::model::ProcessStructure;
 use crate::plan::{FitOptions, Fitted, ModelWord};
-use crate::report::{ProcessPlan, Report, fit_process};
+use crate::report::{ProcessPlan, Report, fit_process, fit_process_to_response};
+use crate::spectrum::MeasuredResponse;
 
 /// A process of which the channels are open.
 #[derive(Debug)]
@@ -93,16 +94,15 @@ impl Draft for ProcessDraft {
         plan.check()?;
         Ok(Arc::new(plan))
     }
-
-    /// Of all inputs of the response if none are named.
-    fn of_response(&self) -> Option<&ProcessPlan> {
-        Some(&self.plan)
-    }
 }
 
 impl KindPlan for ProcessPlan {
     fn fit(&self, log: Cow<'_, Log>, sources: &[Source], monitor: Monitor<'_>) -> Result<Report, Error> {
         fit_process(&log, sources, self, monitor)
+    }
+
+    fn fit_response(&self, response: &MeasuredResponse, monitor: Monitor<'_>) -> Result<Report, Error> {
+        fit_process_to_response(response, self, monitor)
     }
 }
 

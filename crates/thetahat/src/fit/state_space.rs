@@ -11,9 +11,14 @@ use super::{Common, Draft, KindPlan, common};
 use crate::Error;
 use crate::data::{Log, Source};
 use crate::estimate::{Coupling, Initial, SubspaceOptions, VectorArxInputs, VectorArxOptions};
+use crate::options::Kind;
 use crate::plan::{CoupleWord, DelayRange, FeedthroughWord, FitOptions, OrderOption};
-use crate::report::{NormalEquations, PendingEvaluation, Report, StateSpacePlan, fit_state_space_monitored};
+use crate::report::{
+    NormalEquations, PendingEvaluation, Report, StateSpacePlan, fit_state_space_monitored,
+    fit_states_to_response,
+};
 use crate::select::{Focus, OrderRange};
+use crate::spectrum::MeasuredResponse;
 
 /// The orders of an ARX model that are compared where none are given.
 const CHOSEN_LAGS: RangeInclusive<usize> = 1..=8;
@@ -32,10 +37,10 @@ pub(super) struct StateSpaceDraft {
 }
 
 impl StateSpaceDraft {
-    /// A model of a subspace method, or an ARX model with several outputs.
-    pub(super) fn new(options: &FitOptions, is_arx: bool) -> Result<Self, Error> {
-        let without_inputs = options.is_without_inputs();
-        check(options, is_arx)?;
+    /// A model of a subspace method or of a frequency response, or an ARX model with several outputs.
+    pub(super) fn new(options: &FitOptions, kind: Kind) -> Result<Self, Error> {
+        let (without_inputs, is_arx) = (options.is_without_inputs(), kind == Kind::VECTOR_ARX);
+        check(options, kind)?;
         let Common { estimate, validate, split, detrend, offsets } = common(options)?;
         let order = match options.order {
             Some(OrderOption::Arima(_)) => {
@@ -153,6 +158,10 @@ impl KindPlan for StateSpacePlan {
         fit_state_space_monitored(&log, sources, self, monitor)
     }
 
+    fn fit_response(&self, response: &MeasuredResponse, monitor: Monitor<'_>) -> Result<Report, Error> {
+        fit_states_to_response(response, self, monitor)
+    }
+
     fn begin(
         &self,
         log: Cow<'_, Log>,
@@ -210,14 +219,15 @@ fn arx(options: &FitOptions, without_inputs: bool) -> Result<VectorArxOptions, E
 }
 
 /// What the table of options does not say: options whose values go with some models alone.
-fn check(options: &FitOptions, is_arx: bool) -> Result<(), Error> {
+fn check(options: &FitOptions, kind: Kind) -> Result<(), Error> {
     let refused = |option: &str, message: &str| Err(Error::argument(option, message));
     if options.refine.is_none()
+        && kind != Kind::RESPONSE_STATES
         && let Some(option) = options.first_given(&search::OPTIONS)
     {
         return refused(&option, "it is for a search; give `refine` too");
     }
-    if !is_arx && !options.nb.is_empty() && !options.is_without_inputs() {
+    if kind != Kind::VECTOR_ARX && !options.nb.is_empty() && !options.is_without_inputs() {
         return refused(
             "nb",
             "models in state space have no polynomials; leave it out, or give 0 for no inputs",

@@ -15,7 +15,7 @@ use crate::Error;
 use crate::model::PolynomialModel;
 pub use balance::Reduced;
 pub use continuous::{ContinuousStateSpace, Hold};
-pub(crate) use eigen::{is_stable, symmetric_eigen};
+pub(crate) use eigen::{eigenvalues, is_stable, symmetric_eigen};
 pub use fitted::StateSpaceModel;
 pub use in_seconds::ContinuousStateSpaceModel;
 pub(super) use in_seconds::Head;

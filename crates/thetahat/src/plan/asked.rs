@@ -45,6 +45,9 @@ impl FitOptions {
         let because = |option: &str| Some(option.to_owned());
         let several_outputs = match fitted {
             Fitted::Equations => return Asked { kind: Kind::EQUATIONS, because: because("`grey`") },
+            Fitted::Response if self.model == Some(ModelWord::Ss) => {
+                return Asked { kind: Kind::RESPONSE_STATES, because: because("`from` with `model` ss") };
+            }
             Fitted::Response => return Asked { kind: Kind::RESPONSE, because: because("`from`") },
             Fitted::Log { several_outputs } => several_outputs || self.output.len() > 1,
         };

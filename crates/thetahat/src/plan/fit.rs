@@ -30,6 +30,7 @@ const C: Kind = Kind::PROCESS;
 const N: Kind = Kind::NONLINEAR_ARX;
 const E: Kind = Kind::EQUATIONS;
 const R: Kind = Kind::RESPONSE;
+const Q: Kind = Kind::RESPONSE_STATES;
 
 options! {
     /// The options of a fit, as they were given: a plan.
@@ -50,9 +51,9 @@ options! {
     /// ```
     FitOptions of "a fit" {
         /// Input columns; a name that holds a comma stands between double quotes, as in CSV
-        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R A];
+        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R A Q];
         /// Output column; with `model` ss, `model` arx and `narx` one or more
-        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A R];
+        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A R Q];
         /// Rows to estimate on, 1-based and inclusive, counted through all logs
         estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E A];
         /// Rows to validate on
@@ -67,7 +68,7 @@ options! {
         prefilter: Option<Prefilter>, "LOW..HIGH", "", CHANNELS, [P I];
         /// The model structure
         model: Option<ModelWord>, "MODEL", "arx; without orders the data choose; with several outputs and no orders ss", MODEL,
-            [P I S V C R A];
+            [P I S V C R A Q];
         /// Coefficients of A: past outputs
         na: Option<OrderRange>, "N|A..B", "", MODEL, [P V];
         /// Which past outputs each output of an ARX model depends on: full, those of all outputs; none, its own; auto,
@@ -83,7 +84,7 @@ options! {
         nf: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P];
         /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the
         /// input acts in the same sample
-        nk: Vec<DelayRange>, "N|A..B[,…]", "1, arima 0; without orders the data choose", MODEL, [P I S V N A];
+        nk: Vec<DelayRange>, "N|A..B[,…]", "1, arima 0; without orders the data choose", MODEL, [P I S V N A Q];
         /// Taps of an impulse response (`model` fir): g(nk), g(nk+1), …; one value for each input or one for all
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
         /// The prior of an impulse response (`model` fir): that it decays and is smooth
@@ -120,7 +121,7 @@ options! {
         trend: bool, "", "", MODEL, [P I C A];
         /// p,d,q of a seasonal ARIMA model (`model` arima): autoregressive parameters, differences and parameters of
         /// the moving average. The number of states (`model` ss), or a range, from which the least MDL is chosen
-        order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20", SEASONS, [S A];
+        order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20", SEASONS, [S A Q];
         /// The same over seasons, and the rows that a season has: P,D,Q,s. Inputs, if `input` names any, act on the
         /// output in the same row unless `nk` says otherwise, and all else is the noise
         seasonal: Option<SeasonalOption>, "P,D,Q,s", "no seasons", SEASONS, [A];
@@ -133,7 +134,7 @@ options! {
         weighting: Option<Weighting>, "METHOD", "ssarx", STATES, [S];
         /// Whether inputs act on the outputs in the same sample. auto: if that lowers MDL and no feedback from the
         /// outputs to the inputs is found
-        feedthrough: Option<FeedthroughWord>, "FEEDTHROUGH", "auto", STATES, [S];
+        feedthrough: Option<FeedthroughWord>, "FEEDTHROUGH", "auto", STATES, [S Q];
         /// Refine the model of the subspace method by a search for the least errors one step ahead (prediction) or of
         /// the free run (simulation): poles, gains and responses then have standard errors
         refine: Option<Refine>, "prediction|simulation", "", STATES, [S];
@@ -183,13 +184,13 @@ options! {
         /// again to the first two and evaluated on the third; 0 for no such part
         split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N E A];
         /// The search algorithm
-        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R A];
+        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R A Q];
         /// The largest number of iterations from each start
-        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R A];
+        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R A Q];
         /// Stop where the next step would lower the cost by less than this fraction
-        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R A];
+        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R A Q];
         /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l
-        step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R];
+        step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R Q];
         /// Search from this many further starts
         starts: Option<usize>, "K", "0, with `narx` 4, with `grey` some where the first one fails", SEARCH, [P C N E R];
         /// Add intervals of 95 % by profile likelihood, which know bounds and curvature; some twenty searches for each
@@ -198,7 +199,7 @@ options! {
         /// The seed of random starts and of random centres
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
         /// After this time begin no iteration and no search from a further start
-        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R A];
+        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R A Q];
         /// The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is robust to
         /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K =
         /// 1.345 by default); inf, the largest error

@@ -105,6 +105,7 @@ fn a_kind_of_model_takes_its_own_options() -> Result<(), Error> {
         (r#"{"model": "fir"}"#, log, Kind::IMPULSE_RESPONSE),
         (r#"{"np": 2}"#, log, Kind::PROCESS),
         (r#"{"structure": "p1"}"#, Fitted::Response, Kind::RESPONSE),
+        (r#"{"model": "ss", "order": "1..4"}"#, Fitted::Response, Kind::RESPONSE_STATES),
         (r#"{"narx": "auto"}"#, log, Kind::NONLINEAR_ARX),
         ("{}", Fitted::Equations, Kind::EQUATIONS),
         ("{}", Fitted::Log { several_outputs: true }, Kind::STATE_SPACE),

@@ -87,6 +87,8 @@ impl Kind {
     pub const EQUATIONS: Self = Self::new("`grey`");
     /// A process in continuous time of a measured frequency response.
     pub const RESPONSE: Self = Self::new("`from`");
+    /// State space of a measured frequency response.
+    pub const RESPONSE_STATES: Self = Self::new("`from` with `model` ss");
 }
 
 /// Which past outputs an output depends on.

@@ -1,6 +1,10 @@
 //! What fits to measured frequency responses have in common.
 
+use std::f64::consts::PI;
+
 use super::schema::{Data, Missing};
+use crate::Error;
+use crate::estimate::ResponsePoints;
 use crate::figures::short;
 use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::spectrum::MeasuredResponse;
@@ -17,6 +21,53 @@ pub(super) fn fitted(response: &FrequencyResponse) -> impl Iterator<Item = &Freq
 pub(super) fn variance(point: &FrequencyPoint) -> Option<f64> {
     let [[re, _], [_, im]] = point.covariance?;
     Some((re + im) / 2.0).filter(|variance| *variance > 0.0)
+}
+
+/// The responses from inputs of these names, from all if there are none.
+///
+/// # Errors
+/// [`Error::Argument`] for an input that the response does not have.
+pub(super) fn from_inputs<'r>(
+    response: &'r MeasuredResponse,
+    names: &[String],
+) -> Result<Vec<&'r FrequencyResponse>, Error> {
+    if names.is_empty() {
+        return Ok(response.responses.iter().collect());
+    }
+    let of = |name: &String| {
+        response.from_input(name).ok_or_else(|| {
+            let there: Vec<&str> = response.responses.iter().filter_map(|own| own.input.as_deref()).collect();
+            let message = format!("the response has none called '{name}', but: {}", there.join(", "));
+            Error::argument("input", message)
+        })
+    };
+    names.iter().map(of).collect()
+}
+
+/// The points of the response from an input, and what each is multiplied by.
+pub(super) fn points(own: &FrequencyResponse, response: &MeasuredResponse) -> ResponsePoints {
+    let known = fitted(own).all(|point| variance(point).is_some());
+    let weight = |point: &FrequencyPoint| match variance(point) {
+        Some(variance) if known => 1.0 / variance.sqrt(),
+        _ => 1.0 / point.magnitude.value,
+    };
+    ResponsePoints {
+        frequencies: fitted(own).map(|point| point.frequency).collect(),
+        values: fitted(own).map(|point| [point.re, point.im]).collect(),
+        weights: fitted(own).map(weight).collect(),
+        known,
+        sample_time: response.sample_time,
+        held: !response.continuous,
+        correlation: response.correlation(),
+    }
+}
+
+/// The variance of the noise: the mean of its density times the band.
+pub(super) fn noise_variance(response: &MeasuredResponse) -> f64 {
+    let known: Vec<f64> = response.noise.iter().filter_map(|point| point.density).collect();
+    let mean = known.iter().sum::<f64>() / known.len() as f64;
+    let variance = mean * PI / response.sample_time;
+    if variance.is_finite() { variance } else { 0.0 }
 }
 
 /// What a model of these channels was fitted to.

@@ -1,6 +1,7 @@
 //! Fits of state-space models.
 
 mod estimated;
+mod response;
 #[cfg(test)]
 mod tests;
 mod warnings;
@@ -18,6 +19,7 @@ use crate::data::{Detrend, Log, Offset, Rows, Source, Split};
 use crate::estimate::{Constant, Criteria, Initial, Refine, SubspaceOptions, VectorArxOptions};
 use crate::model::{Quantity, Signal, StateSpaceModel};
 pub(super) use estimated::{Estimated, by_sums, of_arx};
+pub use response::fit_states_to_response;
 
 /// Which state-space model to fit, and to which part of a log.
 #[derive(Debug, Clone, PartialEq)]

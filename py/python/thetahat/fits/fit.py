@@ -13,6 +13,7 @@ from thetahat.engine import options as _options, progress as _progress
 from thetahat.engine.option_types import FitOptions, ImpulseResponseOptions
 from thetahat.engine.progress import Progress
 from thetahat.engine.values import Order, Orders
+from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.logs.log import Log, handle
 from thetahat.models.model import Model
 
@@ -527,8 +528,10 @@ def search(
         return fitted(log, own, options)
 
 
-def fitted(log: Log, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
+def fitted(log: Log | MeasuredResponse, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
     """A fit by one of the functions that users call: with its own arguments and its options."""
+    if isinstance(log, MeasuredResponse):
+        return told(Model._of(_thetahat.fit_response(log.to_json(), _options.plan({**own, **options}))))
     data = handle("log", log)
     return told(Model._of(_thetahat.fit(data, _options.plan({**own, **options}, len(log)))))
 

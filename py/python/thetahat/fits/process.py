@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from thetahat import _thetahat
 from thetahat.engine import options as _options
 from thetahat.engine.option_types import ProcessOptions
 from thetahat.experiments.spectrum import MeasuredResponse
-from thetahat.fits.fit import told
-from thetahat.logs.log import Log, handle
+from thetahat.fits.fit import fitted
+from thetahat.logs.log import Log
 from thetahat.models.model import Model
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def process(
     """
     names = [structure] if isinstance(structure, str) else list(structure)
     named = ",".join(_options.text("structure", name) for name in names)
-    return _fitted(log, {"model": "process", "structure": named}, options)
+    return fitted(log, {"model": "process", "structure": named}, options)
 
 
 @_options.takes(ProcessOptions)
@@ -140,12 +139,4 @@ def tf(
     >>> dict(zip(model.parameter_names, np.round(model.parameters, 3).tolist()))
     {'b0': 2.0, 'a1': 2.0, 'a0': 1.0}
     """
-    return _fitted(log, {"model": "tf", "np": np, "nz": nz, "delay": delay or None}, options)
-
-
-def _fitted(log: Log | MeasuredResponse, own: Mapping[str, Any], options: Mapping[str, Any]) -> Model:
-    if isinstance(log, MeasuredResponse):
-        found = Model._of(_thetahat.fit_response(log.to_json(), _options.plan({**own, **options})))
-    else:
-        found = Model._of(_thetahat.fit(handle("log", log), _options.plan({**own, **options}, len(log))))
-    return told(found)
+    return fitted(log, {"model": "tf", "np": np, "nz": nz, "delay": delay or None}, options)

@@ -9,6 +9,7 @@ from thetahat.base import numbers as _numbers
 from thetahat.engine import options as _options
 from thetahat.engine.option_types import StateSpaceOptions
 from thetahat.engine.values import Orders
+from thetahat.experiments.spectrum import MeasuredResponse
 from thetahat.fits.fit import fitted
 from thetahat.logs.log import Log
 from thetahat.models.model import Model
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 @_options.takes(StateSpaceOptions)
 def ss(
-    log: Log,
+    log: Log | MeasuredResponse,
     order: int | range | None = None,
     *,
     nk: int | Sequence[int] | None = None,
@@ -32,10 +33,13 @@ def ss(
 
     Parameters
     ----------
-    log : Log
-        The data, with any number of inputs and outputs. Without inputs it is a time series.
+    log : Log or MeasuredResponse
+        The data, with any number of inputs and outputs. Without inputs it is a time series. Or a frequency response: the model is
+        that of the least weighted squared errors, all inputs having the same poles, in continuous time where the response is. It takes
+        ``order``, ``nk``, ``feedthrough`` and the search.
     order : int or range, optional
-        How many states; or among how many to choose by MDL: ``range(1, 11)`` are 1 to 10. From 1 to 20 unless it is said.
+        How many states; or among how many to choose by MDL: ``range(1, 11)`` are 1 to 10. From 1 to 20 unless it is said, of a
+        frequency response 1 to 10.
     nk : int, or one for each input, optional
         Samples from input to first effect. Without it an input acts one sample later, or at once if ``feedthrough`` says so.
     weighting : {"ssarx", "moesp", "n4sid", "cva"}, optional

@@ -29,7 +29,7 @@ const SHIFTS: [f64; 4] =
     [std::f64::consts::SQRT_2, -std::f64::consts::SQRT_2, std::f64::consts::E, -std::f64::consts::E];
 
 /// The eigenvalues of a square matrix, largest first; of a conjugate pair the positive imaginary part first. O(n^3).
-pub(super) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Error> {
     let Deflated { a, b, at_zero } =
         deflated(matrix.clone(), DMatrix::identity(matrix.nrows(), matrix.nrows()))?;
     // Reflections have made an orthogonal matrix of the identity.

@@ -150,6 +150,35 @@ impl ContinuousStateSpaceModel {
         })
     }
 
+    /// A model without noise that was found from sines: A, B, C and D stand as F, G, H and D.
+    ///
+    /// # Errors
+    /// As for other matrices.
+    pub(crate) fn of_sines(
+        (inputs, outputs): (Vec<Signal>, Vec<Signal>),
+        matrices: &StateSpace,
+        free_parameters: usize,
+        covariance: Option<EntryCovariance>,
+    ) -> Result<Self, Error> {
+        let StateSpace { f, g, h, d, k, noise_covariance, sample_time } = matrices;
+        let head = Head {
+            delays: vec![0.0; inputs.len()],
+            inputs,
+            outputs,
+            sample_time: *sample_time,
+            hold: Hold::Zero,
+            free_parameters,
+            degrees_of_freedom: None,
+        };
+        let [a, b, c, d, k] = [f, g, h, d, k].map(Clone::clone);
+        let matrices = ContinuousStateSpace { a, b, c, d, k, noise_intensity: noise_covariance.clone() };
+        let model = Self::new(head, &matrices)?;
+        Ok(match covariance {
+            Some(covariance) => model.with_covariance(covariance),
+            None => model,
+        })
+    }
+
     /// The same with the covariance of the entries of the matrices, and the errors that follow.
     pub(in crate::model) fn with_covariance(mut self, covariance: EntryCovariance) -> Self {
         let ContinuousStateSpace { a, b, c, .. } = self.matrices();

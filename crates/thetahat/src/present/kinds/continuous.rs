@@ -20,17 +20,22 @@ const NO_ERROR: &str = "no time constant goes with a pole that does not decay, a
 pub(super) fn present(on: &mut Sections, report: &Report, model: &ContinuousStateSpaceModel) {
     on.section("Model");
     let (name, step) = (report.model.name(), seconds(model.sample_time));
-    let given = report.estimation.procedure.is_given();
-    let from = if given { "responses in steps of" } else { "from a sample time of" };
+    let own = &report.estimation.procedure;
+    let (given, of_response) = (own.is_given(), own.shared_poles().is_some());
+    let from = if given || of_response { "responses in steps of" } else { "from a sample time of" };
     on.line(format!("{name}, {from} {step} with {}", model.hold));
-    on.line("dx/dt = A x + B u + K e, y = C x + D u + e");
+    on.line(if of_response {
+        "dx/dt = A x + B u, y = C x + D u"
+    } else {
+        "dx/dt = A x + B u + K e, y = C x + D u + e"
+    });
     let inputs = model.inputs.iter().zip(&model.delays).map(|(input, delay)| {
         let waits = if *delay > 0.0 { format!(", delay {}", seconds(*delay)) } else { String::new() };
         format!("{}{waits}", signal("input", input))
     });
     let outputs = model.outputs.iter().map(|output| signal("output", output));
     on.line(inputs.chain(outputs).collect::<Vec<String>>().join(", "));
-    if given && !on.is_page() {
+    if (given || of_response) && !on.is_page() {
         procedure(on, report);
     }
     on.gap();

@@ -4,6 +4,8 @@ use crate::estimate::{
     ConvexOutcome, Coupling, Initial, Norm, Procedure, ProcessOutcome, RefinementOutcome, RobustOutcome,
     Solver, SubspaceOutcome, VectorArxOutcome,
 };
+use thetahat_numerics::optimize::Stopped;
+
 use crate::figures::{fixed, number, scientific, short};
 use crate::model::{Model, Parameter, Signal};
 use crate::present::tree::{Sections, columns, figure, word};
@@ -128,17 +130,21 @@ pub(super) fn procedure(on: &mut Sections, report: &Report) {
             ));
         }
         Procedure::FreeRun(found) => free_run(on, found),
-        Procedure::FrequencyResponse(found) => on.line(format!(
-            "{} parts of points, missed by {} in the mean, {}, {}",
-            estimation.samples,
-            if found.relative {
-                format!("{} % of their size", short(100.0 * estimation.mse.sqrt()))
-            } else {
-                format!("{} of their standard deviations", number(estimation.mse.sqrt()))
-            },
-            counted(found.iterations),
-            stopped(found.stopped)
-        )),
+        Procedure::FrequencyResponse(found) => {
+            on.line(points(estimation, found.relative, found.iterations, found.stopped));
+        }
+        Procedure::SharedPoles(found) => {
+            let feedthrough = match (found.feedthrough, found.feedthrough_given) {
+                (true, true) => "inputs act at once, as asked for",
+                (false, true) => "no input acts at once, as asked for",
+                (true, false) => "inputs act at once, which lowers MDL",
+                (false, false) => "no input acts at once, which lowers MDL",
+            };
+            on.line(points(estimation, found.relative, found.iterations, found.stopped));
+            let count = found.orders.len();
+            let chosen = if count > 1 { format!("; the least MDL of {count} orders") } else { String::new() };
+            on.line(format!("vector fitting and a search; {feedthrough}{chosen}"));
+        }
         Procedure::Subspace(found) => {
             on.line(subspace(found));
             if let Some(RefinementOutcome { errors, search }) = &found.refinement {
@@ -225,6 +231,22 @@ fn free_run(on: &mut Sections, outcome: &ProcessOutcome) {
             "standard errors of errors with the colour of the residuals, an autoregression of order {order}"
         ),
     });
+}
+
+/// How points of a frequency response were fitted to.
+fn points(estimation: &Estimation, is_relative: bool, iterations: usize, why: Stopped) -> String {
+    let root = estimation.mse.sqrt();
+    let missed = if is_relative {
+        format!("{} % of their size", short(100.0 * root))
+    } else {
+        format!("{} of their standard deviations", number(root))
+    };
+    format!(
+        "{} parts of points, missed by {missed} in the mean, {}, {}",
+        estimation.samples,
+        counted(iterations),
+        stopped(why)
+    )
 }
 
 /// How states were found.

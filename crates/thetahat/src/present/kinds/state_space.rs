@@ -42,7 +42,13 @@ pub(super) fn present(on: &mut Sections, report: &Report, model: &StateSpaceMode
     }
     if is_fit {
         let (subspace, vector_arx) = (estimation.procedure.subspace(), estimation.procedure.vector_arx());
-        if subspace.is_some() || vector_arx.is_some() || estimation.procedure.is_given() || on.is_page() {
+        let of_response = estimation.procedure.shared_poles().is_some();
+        if subspace.is_some()
+            || vector_arx.is_some()
+            || of_response
+            || estimation.procedure.is_given()
+            || on.is_page()
+        {
             procedure(on, report);
         }
         if let Some(outcome) = subspace {

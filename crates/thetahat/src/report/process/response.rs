@@ -8,9 +8,8 @@ use crate::data::Offset;
 use crate::estimate::{Criteria, ResponsePoints, least_response_errors};
 use crate::model::{ProcessModel, Signal};
 use crate::report::Report;
-use crate::report::response::{data, fitted, variance, warnings as of_response};
+use crate::report::response::{data, from_inputs, noise_variance, points, warnings as of_response};
 use crate::report::schema::Estimation;
-use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::spectrum::MeasuredResponse;
 
 /// Finds the process whose frequency response, with an input that is held from sample to sample or, of a response in
@@ -61,24 +60,7 @@ pub fn fit_process_to_response(
     plan: &ProcessPlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    let measured: Vec<&FrequencyResponse> = match &*plan.inputs {
-        [] => response.responses.iter().collect(),
-        named => named
-            .iter()
-            .map(|name| {
-                response.from_input(name).ok_or_else(|| {
-                    let there = response.responses.iter().filter_map(|own| own.input.as_deref());
-                    Error::argument(
-                        "input",
-                        format!(
-                            "the response has none called '{name}', but: {}",
-                            there.collect::<Vec<_>>().join(", ")
-                        ),
-                    )
-                })
-            })
-            .collect::<Result<_, Error>>()?,
-    };
+    let measured = from_inputs(response, &plan.inputs)?;
     let inputs = measured.iter().filter_map(|own| own.input.clone()).collect();
     let plan = &ProcessPlan { inputs, output: response.output.clone(), ..plan.clone() };
     plan.check()?;
@@ -104,7 +86,7 @@ pub fn fit_process_to_response(
     let inputs: Vec<Signal> = plan.inputs.iter().map(signal).collect();
     let own = model(plan, response.sample_time, inputs, structures, &names, (false, &found))?;
     // What e is in the time of the samples the noise of the response says, if it does.
-    let own = ProcessModel { noise_variance: noise(response), degrees_of_freedom: None, ..own };
+    let own = ProcessModel { noise_variance: noise_variance(response), degrees_of_freedom: None, ..own };
     let data = data(response, plan.inputs.iter().chain([&plan.output]).cloned());
     let estimation = Estimation {
         initial: None,
@@ -120,29 +102,4 @@ pub fn fit_process_to_response(
     let missed = if points.iter().all(|own| own.known) { found.mse } else { 0.0 };
     warnings.extend(of_response(response, missed));
     Ok(Report { warnings, ..Report::new(data, own, estimation) })
-}
-
-fn points(own: &FrequencyResponse, response: &MeasuredResponse) -> ResponsePoints {
-    let known = fitted(own).all(|point| variance(point).is_some());
-    let weight = |point: &FrequencyPoint| match variance(point) {
-        Some(variance) if known => 1.0 / variance.sqrt(),
-        _ => 1.0 / point.magnitude.value,
-    };
-    ResponsePoints {
-        frequencies: fitted(own).map(|point| point.frequency).collect(),
-        values: fitted(own).map(|point| [point.re, point.im]).collect(),
-        weights: fitted(own).map(weight).collect(),
-        known,
-        sample_time: response.sample_time,
-        held: !response.continuous,
-        correlation: response.correlation(),
-    }
-}
-
-/// The variance of the noise: the mean of its density times the band.
-fn noise(response: &MeasuredResponse) -> f64 {
-    let known: Vec<f64> = response.noise.iter().filter_map(|point| point.density).collect();
-    let mean = known.iter().sum::<f64>() / known.len() as f64;
-    let variance = mean * std::f64::consts::PI / response.sample_time;
-    if variance.is_finite() { variance } else { 0.0 }
 }

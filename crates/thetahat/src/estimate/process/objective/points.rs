@@ -28,7 +28,7 @@ impl ResponsePoints {
     }
 
     /// Real and imaginary parts, times their weights.
-    pub(super) fn measured(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn measured(&self) -> impl Iterator<Item = f64> {
         self.values.iter().zip(&self.weights).flat_map(|(value, weight)| value.map(|part| part * weight))
     }
 }

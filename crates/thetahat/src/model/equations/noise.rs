@@ -91,7 +91,7 @@ impl GreyBox {
         work: &mut Work<S>,
     ) {
         let (program, share) = (&self.noise.process, seconds / self.sample_time);
-        for (place, result) in variances.iter_mut().zip(program.run(leaves, work.reserve(program.size()))) {
+        for (place, result) in variances.iter_mut().zip(program.run_on(leaves, &mut work.process)) {
             *place = result * share;
         }
     }
@@ -107,7 +107,7 @@ impl GreyBox {
         work: &mut Work<S>,
     ) {
         let (program, leaves) = (&self.noise.measurement, self.at(x, z, u, t));
-        for (place, result) in variances.iter_mut().zip(program.run(&leaves, work.reserve(program.size()))) {
+        for (place, result) in variances.iter_mut().zip(program.run_on(&leaves, &mut work.measurement)) {
             *place = result;
         }
     }

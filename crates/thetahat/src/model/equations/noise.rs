@@ -121,6 +121,12 @@ impl GreyBox {
         variances
     }
 
+    /// Whether the covariances of a filter depend on parameters and the steps alone: the equations are linear in the
+    /// states, whose derivatives are the same at any time, and so are the noises.
+    pub(crate) fn has_constant_covariances(&self) -> bool {
+        self.superposes && self.noise.is_constant == [true; 2]
+    }
+
     /// The programs of the variances, per sample of the states, and of the outputs, each with whether it is the same in
     /// every row.
     pub(crate) fn compiled_variances(&self) -> [(&Program, bool); 2] {

@@ -1,7 +1,7 @@
 //! Where the covariance of the filter has settled.
 //!
-//! P, the gains K and the variances S of a linear model do not depend on what was measured, and go to a limit where F, Q,
-//! H and R are the same from row to row (Anderson and Moore, Optimal Filtering, 1979, section 4.4):
+//! P, the gains K and the variances S of a linear model do not depend on what was measured, and go to a limit where F,
+//! Q, H and R are the same from row to row (Anderson and Moore, Optimal Filtering, 1979, section 4.4):
 //!
 //! ```text
 //! P = F (P - P H' (H P H' + R)^-1 H P) F' + Q,   |P(k) - P| <= c k^j rho^k,   rho < 1

@@ -40,6 +40,8 @@ pub trait Number<T: Real>:
 {
     /// The value, without derivatives: to decide by, or to look up in a table.
     fn value(self) -> T;
+    /// The derivatives: none of a plain number.
+    fn derivatives(&self) -> &[T];
     /// √x.
     fn sqrt(self) -> Self;
     /// eˣ.
@@ -80,6 +82,9 @@ pub trait Number<T: Real>:
 impl<T: Real> Number<T> for T {
     fn value(self) -> T {
         self
+    }
+    fn derivatives(&self) -> &[T] {
+        &[]
     }
     fn sqrt(self) -> T {
         nalgebra::ComplexField::sqrt(self)
@@ -315,6 +320,9 @@ impl<T: Real, const D: usize> DivAssign for Dual<T, D> {
 impl<T: Real, const D: usize> Number<T> for Dual<T, D> {
     fn value(self) -> T {
         self.value
+    }
+    fn derivatives(&self) -> &[T] {
+        &self.derivatives
     }
     fn sqrt(self) -> Self {
         let root = Number::sqrt(self.value);

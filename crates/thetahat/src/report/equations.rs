@@ -350,8 +350,9 @@ fn errors(model: &GreyBox, experiments: &[Experiment], found: &EquationsEstimate
     let (mut nis, mut measured) = (0.0, 0);
     let mut squares = 0.0;
     let mut noise = vec![(0.0, 0.0); model.outputs().len()];
+    let bounds: Vec<_> = (0..=model.outputs().len()).map(chi_square_interval).collect();
     let mut add = |nis: f64, measured: usize| {
-        if let Some(bounds) = chi_square_interval(measured) {
+        if let Some(bounds) = bounds[measured] {
             count.add(nis, measured, bounds);
         }
     };

@@ -6,10 +6,11 @@ mod free_run;
 mod frequency;
 mod on_log;
 mod predictor;
+mod settled;
 mod walk;
 
 pub(crate) use experiment::{Experiment, experiments};
 pub(crate) use frequency::response;
 pub(crate) use on_log::EquationsOnLog;
 pub(crate) use predictor::{Innovation, Predictor};
-pub(crate) use walk::{Failure, reach, step, walk};
+pub(crate) use walk::{Failure, step, walk};

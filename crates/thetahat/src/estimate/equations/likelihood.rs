@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use thetahat_core::Dual;
 
 use crate::model::GreyBox;
-use crate::respond::equations::{Experiment, Failure, Innovation, Predictor, reach, step, walk};
+use crate::respond::equations::{Experiment, Failure, Innovation, Predictor, step, walk};
 
 /// Derivatives that are computed together.
 pub(crate) const LANE: usize = 4;
@@ -142,17 +142,13 @@ impl Lane {
         let Self { predictor, variables, innovations } = self;
         innovations.clear();
         for row in rows {
-            let failure = Failure { log, row };
-            if !experiment.counts(row) {
-                step(model, experiment, predictor, variables, row, |_, _, _| {}).ok_or(failure)?;
-                continue;
-            }
-            reach(model, experiment, predictor, variables, row);
-            for (index, &measured) in experiment.output(row).iter().enumerate() {
-                if !measured.is_nan() {
-                    innovations.push(predictor.absorb(index, measured).ok_or(failure)?);
+            let counts = experiment.counts(row);
+            step(model, experiment, predictor, variables, row, |_, _, innovation| {
+                if counts {
+                    innovations.push(innovation);
                 }
-            }
+            })
+            .ok_or(Failure { log, row })?;
         }
         Ok(())
     }

@@ -6,7 +6,7 @@ use super::GreyBox;
 use super::drive::Drive;
 use super::exact::ExactStep;
 use super::graph::Leaves;
-use super::program::Program;
+use super::program::{Kept, Program};
 
 /// Some functions of state, parameters, inputs and time, with their derivatives.
 ///
@@ -30,10 +30,10 @@ impl Functions {
         leaves: &Leaves<'_, S>,
         values: &mut [S],
         jacobian: &mut [S],
-        work: &mut [S],
+        kept: &mut Kept<S>,
     ) {
         let columns = jacobian.len() / values.len().max(1);
-        let results = self.with_columns(columns, leaves.states.len()).run(leaves, work);
+        let results = self.with_columns(columns, leaves.states.len()).run_on(leaves, kept);
         for (place, result) in values.iter_mut().chain(jacobian).zip(results) {
             *place = result;
         }
@@ -52,16 +52,21 @@ pub(crate) enum Step {
     Exact(usize),
 }
 
-/// Numbers to work in, and the last exact step, which is the same from row to row.
+/// Numbers to work in, and what is the same from row to row: the last exact step, and of the programs of one model what
+/// is made of parameters. It is for one model and, in dual numbers, for derivatives by the same variables.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Work<S> {
     numbers: Vec<S>,
-    exact: Option<Kept<S>>,
+    exact: Option<KeptStep<S>>,
+    transition: Kept<S>,
+    observation: Kept<S>,
+    pub(super) process: Kept<S>,
+    pub(super) measurement: Kept<S>,
 }
 
 /// The exact step of some parameters and seconds.
 #[derive(Debug, Clone)]
-struct Kept<S> {
+struct KeptStep<S> {
     parameters: Vec<S>,
     seconds: f64,
     step: ExactStep<S>,
@@ -69,15 +74,27 @@ struct Kept<S> {
 
 impl<S: Number<f64>> Work<S> {
     pub(crate) const fn new() -> Self {
-        Self { numbers: Vec::new(), exact: None }
+        Self {
+            numbers: Vec::new(),
+            exact: None,
+            transition: Kept::new(),
+            observation: Kept::new(),
+            process: Kept::new(),
+            measurement: Kept::new(),
+        }
     }
 
     /// At least this many numbers to work in.
     pub(super) fn reserve(&mut self, size: usize) -> &mut [S] {
+        self.split(size).0
+    }
+
+    /// The same, and what is kept of the equations of the states.
+    fn split(&mut self, size: usize) -> (&mut [S], &mut Kept<S>) {
         if self.numbers.len() < size {
             self.numbers.resize(size, 0.0.into());
         }
-        &mut self.numbers
+        (&mut self.numbers, &mut self.transition)
     }
 }
 
@@ -118,22 +135,19 @@ impl GreyBox {
         let (n, size) = (next.len(), jacobian.len());
         let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt, span: (t, dt) };
         let count = match self.step {
-            Step::Next => {
-                let program = work.reserve(self.transition.full.size());
-                return self.transition.run(&leaves, next, jacobian, program);
-            }
+            Step::Next => return self.transition.run(&leaves, next, jacobian, &mut work.transition),
             Step::Exact(_) if size == n * n => return self.exactly(&leaves, next, jacobian, work),
             Step::Integrated(count) | Step::Exact(count) => count,
         };
         let zero: S = 0.0.into();
-        let rest = work.reserve(self.transition.full.size() + 3 * n + 4 * size);
+        let (rest, kept) = work.split(3 * n + 4 * size);
         let (stage, rest) = rest.split_at_mut(n);
         let (rate, rest) = rest.split_at_mut(n);
         let (sum, rest) = rest.split_at_mut(n);
         let (stage_jacobian, rest) = rest.split_at_mut(size);
         let (rate_jacobian, rest) = rest.split_at_mut(size);
         let (sum_jacobian, rest) = rest.split_at_mut(size);
-        let (partial, program) = rest.split_at_mut(size);
+        let partial = &mut rest[..size];
 
         next.copy_from_slice(x);
         jacobian.fill(zero);
@@ -152,7 +166,7 @@ impl GreyBox {
                 }
                 let time = t + (index as f64 + a) * h;
                 let leaves = Leaves { states: stage, time, step: h, ..leaves };
-                self.transition.run(&leaves, rate, partial, program);
+                self.transition.run(&leaves, rate, partial, kept);
                 multiply(&partial[..n * n], stage_jacobian, rate_jacobian);
                 for (entry, &by_parameter) in rate_jacobian.iter_mut().zip(&*partial).skip(n * n) {
                     *entry += by_parameter;
@@ -176,20 +190,20 @@ impl GreyBox {
         let (n, dt) = (next.len(), leaves.step);
         self.keep_exact(leaves, dt, work);
         let program = &self.transition.by_state;
-        let numbers = work.reserve(program.size() + 2 * n);
+        let (numbers, kept) = work.split(2 * n);
         let (rates, rest) = numbers.split_at_mut(n);
-        let (bends, numbers) = rest.split_at_mut(n);
-        for (rate, result) in rates.iter_mut().zip(program.run(leaves, numbers)) {
+        let bends = &mut rest[..n];
+        for (rate, result) in rates.iter_mut().zip(program.run_on(leaves, kept)) {
             *rate = result;
         }
         let is_bent = self.bends;
         if is_bent {
             let end = Leaves { time: leaves.time + dt, ..*leaves };
-            for ((bend, result), &rate) in bends.iter_mut().zip(program.run(&end, numbers)).zip(&*rates) {
+            for ((bend, result), &rate) in bends.iter_mut().zip(program.run_on(&end, kept)).zip(&*rates) {
                 *bend = (result - rate) * (1.0 / dt);
             }
         }
-        let Some(Kept { step, .. }) = &work.exact else { return };
+        let Some(KeptStep { step, .. }) = &work.exact else { return };
         let (rates, bends) = (&work.numbers[..n], &work.numbers[n..2 * n]);
         next.copy_from_slice(leaves.states);
         for (column, &rate) in step.integral.chunks_exact(n).zip(rates) {
@@ -203,18 +217,17 @@ impl GreyBox {
 
     /// Computes the exact step unless it is the last one.
     fn keep_exact<S: Number<f64>>(&self, leaves: &Leaves<'_, S>, dt: f64, work: &mut Work<S>) {
-        let is_kept = |kept: &Kept<S>| kept.seconds == dt && kept.parameters == leaves.parameters;
+        let is_kept = |kept: &KeptStep<S>| kept.seconds == dt && kept.parameters == leaves.parameters;
         if work.exact.as_ref().is_some_and(is_kept) {
             return;
         }
         let n = self.states.len();
-        let numbers = work.reserve(self.transition.by_state.size());
-        let a: Vec<S> = self.transition.by_state.run(leaves, numbers).skip(n).collect();
+        let a: Vec<S> = self.transition.by_state.run_on(leaves, &mut work.transition).skip(n).collect();
         let mut intensities = vec![S::from(0.0); n];
         self.process_variances(leaves, self.sample_time, &mut intensities, work);
         intensities.iter_mut().for_each(|variance| *variance = *variance * (1.0 / self.sample_time));
         let step = ExactStep::new(&a, &intensities, dt);
-        work.exact = Some(Kept { parameters: leaves.parameters.to_vec(), seconds: dt, step });
+        work.exact = Some(KeptStep { parameters: leaves.parameters.to_vec(), seconds: dt, step });
     }
 
     /// The covariance U diag(d) U' that noise adds to the state over the same step: U, unit upper triangular, column
@@ -234,7 +247,7 @@ impl GreyBox {
         let leaves = Leaves { states: x, parameters: z, inputs: u, time: t, step: dt, span: (t, dt) };
         if let Step::Exact(_) = self.step {
             self.keep_exact(&leaves, dt, work);
-            if let Some(Kept { step, .. }) = &work.exact {
+            if let Some(KeptStep { step, .. }) = &work.exact {
                 factor.copy_from_slice(&step.noise_factor);
                 variances.copy_from_slice(&step.noise_variances);
             }
@@ -304,8 +317,7 @@ impl GreyBox {
         work: &mut Work<S>,
     ) {
         let leaves = self.at(x, z, u, t);
-        let program = work.reserve(self.observation.full.size());
-        self.observation.run(&leaves, y, jacobian, program);
+        self.observation.run(&leaves, y, jacobian, &mut work.observation);
     }
 }
 

@@ -91,7 +91,7 @@ impl GreyBox {
         work: &mut Work<S>,
     ) {
         let (program, share) = (&self.noise.process, seconds / self.sample_time);
-        for (place, result) in variances.iter_mut().zip(program.run(leaves, work.reserve(program.size()))) {
+        for (place, result) in variances.iter_mut().zip(program.run_on(leaves, &mut work.process)) {
             *place = result * share;
         }
     }
@@ -107,7 +107,7 @@ impl GreyBox {
         work: &mut Work<S>,
     ) {
         let (program, leaves) = (&self.noise.measurement, self.at(x, z, u, t));
-        for (place, result) in variances.iter_mut().zip(program.run(&leaves, work.reserve(program.size()))) {
+        for (place, result) in variances.iter_mut().zip(program.run_on(&leaves, &mut work.measurement)) {
             *place = result;
         }
     }
@@ -119,6 +119,12 @@ impl GreyBox {
         let mut variances = vec![0.0; self.outputs.len()];
         self.measurement_variances(&x, &z, Drive::held(&u), 0.0, &mut variances, &mut Work::new());
         variances
+    }
+
+    /// Whether the covariances of a filter depend on parameters and the steps alone: the equations are linear in the
+    /// states, whose derivatives are the same at any time, and so are the noises.
+    pub(crate) fn has_constant_covariances(&self) -> bool {
+        self.superposes && self.noise.is_constant == [true; 2]
     }
 
     /// The programs of the variances, per sample of the states, and of the outputs, each with whether it is the same in

@@ -11,8 +11,24 @@ use super::table::Table;
 #[derive(Debug, Clone)]
 pub(crate) struct Program {
     operations: Vec<Operation>,
+    /// Those that are another number from row to row: the others are made of parameters and the length of a step.
+    moving: Vec<usize>,
     results: Vec<usize>,
     tables: Vec<Arc<Table>>,
+}
+
+/// The numbers of a program that ran last with these parameters and this length of a step.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kept<S> {
+    parameters: Vec<S>,
+    step: f64,
+    values: Vec<S>,
+}
+
+impl<S> Kept<S> {
+    pub(super) const fn new() -> Self {
+        Self { parameters: Vec::new(), step: 0.0, values: Vec::new() }
+    }
 }
 
 impl Program {
@@ -25,8 +41,14 @@ impl Program {
             places[node] = operations.len();
             operations.push(operation.moved(|argument| places[argument]));
         }
+        let mut moves = vec![false; operations.len()];
+        for (place, operation) in operations.iter().enumerate() {
+            let mut arguments = operation.arguments().into_iter().flatten();
+            moves[place] = operation.moves() || arguments.any(|argument| moves[argument]);
+        }
+        let moving = (0..moves.len()).filter(|place| moves[*place]).collect();
         let results = roots.iter().map(|&root| places[root]).collect();
-        Self { operations, results, tables: graph.tables().to_vec() }
+        Self { operations, moving, results, tables: graph.tables().to_vec() }
     }
 
     /// The tables that the operations name.
@@ -72,6 +94,31 @@ impl Program {
     ) -> impl Iterator<Item = S> + use<'s, S> {
         for (place, &operation) in self.operations.iter().enumerate() {
             values[place] = graph::value(operation, &self.tables, leaves, values);
+        }
+        self.results.iter().map(|&place| values[place])
+    }
+
+    /// The same, where it runs from row to row: what is made of parameters alone is computed once for each of them. In
+    /// dual numbers, derivatives must be by the same variables each time. Nothing is allocated after the first run.
+    pub(super) fn run_on<'s, S: Number<f64>>(
+        &'s self,
+        leaves: &Leaves<'_, S>,
+        kept: &'s mut Kept<S>,
+    ) -> impl Iterator<Item = S> + use<'s, S> {
+        let is_kept = kept.values.len() == self.size()
+            && kept.step == leaves.step
+            && kept.parameters == leaves.parameters;
+        let Kept { parameters, step, values } = kept;
+        if is_kept {
+            for &place in &self.moving {
+                values[place] = graph::value(self.operations[place], &self.tables, leaves, values);
+            }
+        } else {
+            parameters.clear();
+            parameters.extend_from_slice(leaves.parameters);
+            *step = leaves.step;
+            values.resize(self.size(), S::from(0.0));
+            let _ = self.run(leaves, values);
         }
         self.results.iter().map(|&place| values[place])
     }

@@ -73,8 +73,20 @@ impl Experiment {
             Some(time) => time[rows.clone()].iter().map(|seconds| seconds - time[rows.start]).collect(),
             None => (0..rows.len()).map(|row| row as f64 * log.sample_time()).collect(),
         };
+        // Steps that differ by the rounding of their times are equal where one is prepared for all rows of its length.
+        let last = log.time().map_or(&times[..], |time| &time[rows.clone()]).last();
+        let rounding = match last {
+            Some(last) if model.has_constant_covariances() => 4.0 * f64::EPSILON * last.abs(),
+            _ => 0.0,
+        };
+        let mut equal = f64::INFINITY;
         let steps = times.windows(2).zip(rows.start + 2..).map(|(pair, row)| {
-            model.division(pair[1] - pair[0]).map_err(|error| Error::Data {
+            let step = pair[1] - pair[0];
+            let is_equal = (step - equal).abs() <= rounding && equal > rounding;
+            if !is_equal {
+                equal = step;
+            }
+            model.division(equal).map_err(|error| Error::Data {
                 channel: None,
                 row: Some(row),
                 message: format!("row {row}: {error}"),
@@ -114,6 +126,13 @@ impl Experiment {
 
     pub(crate) fn rows(&self) -> usize {
         self.times.len()
+    }
+
+    /// Whether a filter does the same to its covariance in two rows: after equal steps, the same outputs are measured.
+    pub(crate) fn is_alike(&self, row: usize, other: usize) -> bool {
+        let step = |row: usize| row.checked_sub(1).and_then(|before| self.steps.get(before));
+        let mut outputs = self.output(row).iter().zip(self.output(other));
+        step(row) == step(other) && outputs.all(|(one, other)| one.is_nan() == other.is_nan())
     }
 
     /// The rows that count, in rising order.

@@ -22,6 +22,7 @@
 
 use thetahat_core::Number;
 
+use super::settled::Settling;
 use crate::model::{
     GreyBox,
     equations::{Drive, Work},
@@ -54,9 +55,14 @@ pub(crate) struct Predictor<S> {
     /// The rows of [F U | U_q], one after the other, and the weights of their columns.
     rows: Vec<S>,
     weights: Vec<S>,
-    /// U'h and D U'h.
+    /// U'h.
     projected: Vec<S>,
-    gain: Vec<S>,
+    /// P h and S of each element, about what those before it have left.
+    gains: Vec<S>,
+    variances: Vec<S>,
+    settling: Settling<S>,
+    /// Whether the covariance stays as it is: then gains and S are those of the last row.
+    is_held: bool,
     work: Work<S>,
 }
 
@@ -87,7 +93,10 @@ impl<S: Number<f64>> Predictor<S> {
             rows: zeros(2 * n * n),
             weights: zeros(2 * n),
             projected: zeros(n),
-            gain: zeros(n),
+            gains: zeros(m * n),
+            variances: zeros(m),
+            settling: Settling::new(model.has_constant_covariances(), n * n),
+            is_held: false,
             work: Work::new(),
         }
     }
@@ -95,6 +104,8 @@ impl<S: Number<f64>> Predictor<S> {
     /// Goes to the start of a log: x0, and P diagonal.
     pub(crate) fn restart(&mut self, model: &GreyBox, z: &[S]) {
         let n = self.state.len();
+        self.settling.restart();
+        self.is_held = false;
         model.start(z, &mut self.state, &mut self.process, &mut self.work);
         self.factor.fill(S::from(0.0));
         self.factor.iter_mut().step_by(n + 1).zip(&self.process).for_each(|(own, &variance)| *own = variance);
@@ -104,6 +115,25 @@ impl<S: Number<f64>> Predictor<S> {
     pub(crate) fn copy_from(&mut self, other: &Self) {
         self.state.copy_from_slice(&other.state);
         self.factor.copy_from_slice(&other.factor);
+    }
+
+    /// Begins a row. Where the covariance has settled in rows like this one, the state alone goes on, until the row
+    /// [ends](Self::end). n (n + 2 m) multiply-adds instead of the others.
+    pub(crate) fn begin(&mut self, is_alike: impl Fn(usize) -> bool) {
+        self.is_held = self.settling.holds(is_alike);
+    }
+
+    /// Ends a row in which everything that was measured is taken.
+    pub(crate) fn end(&mut self, row: usize, is_alike: impl Fn(usize) -> bool) {
+        if !std::mem::take(&mut self.is_held) {
+            self.settling.note(row, &self.factor, is_alike);
+        }
+    }
+
+    /// Whether the covariance is at its limit.
+    #[cfg(test)]
+    pub(super) fn has_settled(&self) -> bool {
+        self.settling.is_there
     }
 
     /// H P H' + r of one output about the predicted state: the variance of what is measured of it. n^2 multiply-adds.
@@ -121,10 +151,21 @@ impl<S: Number<f64>> Predictor<S> {
 
     /// Over a step of `dt` seconds from the time `t`, with the input held. About 4 n^3 multiply-adds beside the model.
     pub(crate) fn predict(&mut self, model: &GreyBox, z: &[S], u: Drive<'_>, t: f64, dt: f64) {
-        let n = self.state.len();
-        let (factor, variances) = (&mut self.process_factor, &mut self.process);
-        model.process_noise(&self.state, z, u, t, dt, factor, variances, &mut self.work);
+        if !self.is_held {
+            let (factor, variances) = (&mut self.process_factor, &mut self.process);
+            model.process_noise(&self.state, z, u, t, dt, factor, variances, &mut self.work);
+        }
         model.advance(&self.state, z, u, t, dt, &mut self.next, &mut self.state_matrix, &mut self.work);
+        std::mem::swap(&mut self.state, &mut self.next);
+        if !self.is_held {
+            self.spread();
+        }
+    }
+
+    /// P <- F P F' + Q.
+    fn spread(&mut self) {
+        self.settling.is_there = false;
+        let n = self.state.len();
         let zero = S::from(0.0);
         let width = 2 * n;
         for row in 0..n {
@@ -166,13 +207,14 @@ impl<S: Number<f64>> Predictor<S> {
                 other.iter_mut().zip(own).for_each(|(other, &own)| *other -= entry * own);
             }
         }
-        std::mem::swap(&mut self.state, &mut self.next);
     }
 
     /// Linearises the measurement about the predicted state.
     pub(crate) fn observe(&mut self, model: &GreyBox, z: &[S], u: Drive<'_>, t: f64) {
         model.observe(&self.state, z, u, t, &mut self.output, &mut self.output_matrix, &mut self.work);
-        model.measurement_variances(&self.state, z, u, t, &mut self.measurement, &mut self.work);
+        if !self.is_held {
+            model.measurement_variances(&self.state, z, u, t, &mut self.measurement, &mut self.work);
+        }
         self.origin.copy_from_slice(&self.state);
     }
 
@@ -180,11 +222,32 @@ impl<S: Number<f64>> Predictor<S> {
     /// finite: then the filter is of no more use. 2 n^2 multiply-adds.
     pub(crate) fn absorb(&mut self, index: usize, measured: f64) -> Option<Innovation<S>> {
         let (n, m) = (self.state.len(), self.output.len());
-        let zero = S::from(0.0);
         let mut error = -(self.output[index] - measured);
         for column in 0..n {
             error -= self.output_matrix[column * m + index] * (self.state[column] - self.origin[column]);
         }
+        if !self.is_held {
+            self.sharpen(index);
+        }
+        let variance = self.variances[index];
+        let (e, s) = (error.value(), variance.value());
+        // Not for NaN either.
+        if !(s > 0.0 && s.is_finite() && (e * e / s).is_finite()) {
+            return None;
+        }
+        let scale = error / variance;
+        for (state, &gain) in self.state.iter_mut().zip(&self.gains[index * n..]) {
+            *state += gain * scale;
+        }
+        Some(Innovation { error, variance, noise: self.measurement[index] })
+    }
+
+    /// P h and S of an element, and P <- P - P h h' P/S.
+    fn sharpen(&mut self, index: usize) {
+        self.settling.is_there = false;
+        let (n, m) = (self.state.len(), self.output.len());
+        let zero = S::from(0.0);
+        let first = index * n;
         let noise = self.measurement[index];
         let mut variance = noise;
         for column in 0..n {
@@ -192,17 +255,13 @@ impl<S: Number<f64>> Predictor<S> {
                 .map(|k| self.factor[column * n + k] * self.output_matrix[k * m + index])
                 .fold(self.output_matrix[column * m + index], |sum, product| sum + product);
             self.projected[column] = known;
-            self.gain[column] = self.factor[column * n + column] * known;
-            variance += known * self.gain[column];
+            self.gains[first + column] = self.factor[column * n + column] * known;
+            variance += known * self.gains[first + column];
         }
-        let (e, s) = (error.value(), variance.value());
-        // Not for NaN either.
-        if !(s > 0.0 && s.is_finite() && (e * e / s).is_finite()) {
-            return None;
-        }
+        self.variances[index] = variance;
         let mut before = noise;
         for column in 0..n {
-            let (f, v) = (self.projected[column], self.gain[column]);
+            let (f, v) = (self.projected[column], self.gains[first + column]);
             let after = before + f * v;
             // Where a_(j-1) is 0, nothing is known to be uncertain yet: all b are 0.
             let (kept, p) = if before.value() > 0.0 { (before / after, -f / before) } else { (zero, zero) };
@@ -211,16 +270,11 @@ impl<S: Number<f64>> Predictor<S> {
             }
             for row in 0..column {
                 let given = self.factor[column * n + row];
-                self.factor[column * n + row] = given + self.gain[row] * p;
-                self.gain[row] += given * v;
+                self.factor[column * n + row] = given + self.gains[first + row] * p;
+                self.gains[first + row] += given * v;
             }
             before = after;
         }
-        let scale = error / variance;
-        for (state, &gain) in self.state.iter_mut().zip(&self.gain) {
-            *state += gain * scale;
-        }
-        Some(Innovation { error, variance, noise })
     }
 
     /// Whether the state is made of numbers.

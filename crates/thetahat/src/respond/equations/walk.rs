@@ -61,8 +61,11 @@ pub(crate) fn step<S: Number<f64>>(
     row: usize,
     mut told: impl FnMut(usize, S, Innovation<S>),
 ) -> Option<()> {
+    let is_alike = |other: usize| experiment.is_alike(row, other);
+    predictor.begin(is_alike);
     reach(model, experiment, predictor, z, row);
     let found = absorb(experiment, predictor, row, &mut told);
+    predictor.end(row, is_alike);
     if found.is_some() || !experiment.warms(row) {
         return found;
     }

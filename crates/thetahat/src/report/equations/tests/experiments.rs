@@ -80,3 +80,25 @@ fn a_step_that_the_model_cannot_take_is_one_of_a_row() {
     let Err(Error::Data { row: Some(3), message, .. }) = refused else { panic!("{refused:?}") };
     assert!(message.starts_with("row 3: "), "{message}");
 }
+
+#[test]
+fn steps_that_differ_by_rounding_are_equal() {
+    let text = "sample_time = 0.1
+         [states]
+         x = { start = 0, sd = 1 }
+         [derivative]
+         x = '-x'
+         [outputs]
+         y = 'x'
+         [noise]
+         measurement = { y = 1 }";
+    let times: Vec<f64> =
+        (0..100).map(|row| 1.7e9 + 0.1 * f64::from(row) + f64::from(row / 50) * 0.02).collect();
+    let recording = Recording {
+        channels: vec![channel("y", (0..100).map(f64::from).collect::<Vec<f64>>())],
+        times: Times::Measured(times),
+    };
+    let found = experiment(&GreyBox::from_toml(text).unwrap(), &recording);
+    let alike: Vec<usize> = (1..100).filter(|row| !found.is_alike(*row, 1)).collect();
+    assert_eq!(alike, [50]);
+}

@@ -9,6 +9,7 @@ use crate::data::{Recording, Times};
 use crate::estimate::equations::{Likelihood, LikelihoodObjective};
 use crate::model::GreyBox;
 use crate::report::{EquationsPlan, ValidationPlan, compare, validate};
+use crate::respond::equations::Experiment;
 use crate::tests::channel;
 
 /// A room with a wall (Madsen and Holst 1995; RC network of two states), in hours, K, kW.
@@ -157,18 +158,18 @@ fn variables(model: &GreyBox, values: &[f64]) -> Vec<f64> {
     model.parameters().iter().zip(values).map(|(unknown, value)| unknown.scale.variable(*value)).collect()
 }
 
-#[test]
-fn the_likelihood_is_that_of_a_dense_filter() {
+/// That the likelihood of logs is that of the dense filter, and its gradient that of differences.
+fn assert_dense(recordings: &[Recording]) {
     let model = room();
     assert_eq!(model.unknown().collect::<Vec<_>>(), ORDER);
-    let mut recording = simulated(233, 4);
-    recording.channels[2].values[50..57].fill(f64::NAN);
-    let experiments = [experiment(&model, &recording)];
+    let experiments: Vec<Experiment> =
+        recordings.iter().map(|recording| experiment(&model, recording)).collect();
     let mut criterion = LikelihoodObjective::new(&model, &experiments);
     for factor in [1.0, 0.7, 1.6] {
         let parameters = TRUTH.map(|truth| truth * factor);
         let z = variables(&model, &parameters);
-        let (value, dense) = (criterion.evaluate(&z).unwrap(), dense_value(parameters, &recording));
+        let dense: f64 = recordings.iter().map(|recording| dense_value(parameters, recording)).sum();
+        let value = criterion.evaluate(&z).unwrap();
         assert!((value - dense).abs() < 1e-9 * dense.abs().max(100.0), "{factor}: {value} {dense}");
         criterion.linearize(&z).unwrap();
         let gradient = criterion.slopes().gradient.clone();
@@ -182,6 +183,21 @@ fn the_likelihood_is_that_of_a_dense_filter() {
             assert!((found - slope).abs() < 1e-5 * (slope.abs() + 1.0), "{}: {found} {slope}", ORDER[index]);
         }
     }
+}
+
+#[test]
+fn the_likelihood_is_that_of_a_dense_filter() {
+    let mut recording = simulated(233, 4);
+    recording.channels[2].values[50..57].fill(f64::NAN);
+    assert_dense(&[recording]);
+}
+
+/// In most rows of these two logs nothing but the state goes on.
+#[test]
+fn the_likelihood_of_long_logs_is_that_of_a_dense_filter() {
+    let mut recordings = [simulated(2500, 4), simulated(1200, 5)];
+    recordings[0].channels[2].values[1200..1211].fill(f64::NAN);
+    assert_dense(&recordings);
 }
 
 #[test]

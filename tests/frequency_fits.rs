@@ -238,7 +238,7 @@ fn state_space_of_a_table_and_of_the_document_of_a_log() {
     let run = folder.done("fit --from z.csv --model ss --order 2 --feedthrough yes --report model.json");
     assert!(run.stdout.contains("inputs act at once, as asked for"), "{}", run.stdout);
     folder.done("bode model.json --over z.csv -o over.csv");
-    folder.done("convert model.json --sample-time 0.01 --report sampled.json");
+    folder.done("convert model.json --to 0.01 -o sampled.json");
     for (line, words) in [
         ("--order 200", "too few for a model of order 200"),
         ("--order 0", "from 1 on"),

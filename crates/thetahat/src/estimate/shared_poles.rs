@@ -10,8 +10,8 @@
 //! 1975); the search moves the logarithms of the a, so that all poles are stable.
 //!
 //! It starts from vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; relaxed: Gustavsen, the
-//! same 21, 2006), which finds poles in turn as the zeros of sigma in sigma G = sum N/P + d, sigma being a quotient over
-//! the poles of before, and from what one pole less found.
+//! same 21, 2006), which finds poles in turn as the zeros of sigma in sigma G = sum N/P + d, sigma being a quotient
+//! over the poles of before, and from what one pole less found.
 
 mod entries;
 mod fitting;

@@ -17,8 +17,8 @@ const DAMPING: f64 = 0.01;
 const LEAST_SIGMA: f64 = 1e-8;
 
 impl PolesObjective<'_> {
-    /// Logarithms of coefficients to search from: where vector fitting leads from lightly damped pairs, from real poles,
-    /// and from the poles of an order less with one more.
+    /// Logarithms of coefficients to search from: where vector fitting leads from lightly damped pairs, from real
+    /// poles, and from the poles of an order less with one more.
     pub(super) fn starts(&mut self, before: Option<&[f64]>) -> Vec<Vec<f64>> {
         let order = self.order();
         let moved = || self.at().iter().flatten().map(|s| s.im).filter(|at| *at > 0.0);
@@ -39,7 +39,7 @@ impl PolesObjective<'_> {
         if let Some(before) = before {
             let mut own: Vec<f64> = before.iter().map(|value| value.exp()).collect();
             let further = (low * high).sqrt();
-            match own.pop().filter(|_| order % 2 == 0) {
+            match own.pop().filter(|_| order.is_multiple_of(2)) {
                 // The real pole of before and one more.
                 Some(alone) => own.extend([alone + further, alone * further]),
                 None => {

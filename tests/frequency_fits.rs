@@ -256,3 +256,21 @@ fn state_space_of_a_table_and_of_the_document_of_a_log() {
     folder.write("z.csv", format!("f,re,im\n{constant}"));
     folder.done("fit --from z.csv --model ss --order 1 --feedthrough yes");
 }
+
+#[test]
+fn a_dead_time_comes_back_over_five_decades() {
+    let folder = Folder::new();
+    // (2 s + 3) e^(-0.01 s)/(s^2 + 0.4 s + 25), from 0.01 to 1000 rad/s.
+    let rows = (0..60).map(|place| {
+        let omega = 10.0_f64.powf(-2.0 + 5.0 * f64::from(place) / 59.0);
+        let (real, imaginary) = (25.0 - omega * omega, 0.4 * omega);
+        let magnitude = (9.0 + 4.0 * omega * omega).sqrt() / real.hypot(imaginary);
+        let phase = (2.0 * omega).atan2(3.0) - imaginary.atan2(real) - 0.01 * omega;
+        format!("{omega},{magnitude},{}\n", phase.to_degrees())
+    });
+    folder.write("z.csv", format!("rad/s,magnitude,phase\n{}", rows.collect::<String>()));
+    let report = folder.fit("--from z.csv --np 2 --nz 1 --delay");
+    for (name, truth) in [("b1", 2.0), ("b0", 3.0), ("a1", 0.4), ("a0", 25.0), ("theta", 0.01)] {
+        near(value(&report, name)[0], truth, 1e-5);
+    }
+}

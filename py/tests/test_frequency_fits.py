@@ -71,6 +71,8 @@ def test_a_transfer_function_in_continuous_time_comes_back() -> None:
     response = th.MeasuredResponse.given(OMEGA, (2 * s + 3) / (s**2 + 0.4 * s + 25))
     model = th.tf(response, 2, 1)
     np.testing.assert_allclose(model.parameters, [2, 3, 0.4, 25], rtol=1e-5)
+    late = th.MeasuredResponse.given(OMEGA, (2 * s + 3) * np.exp(-0.01 * s) / (s**2 + 0.4 * s + 25))
+    np.testing.assert_allclose(th.tf(late, 2, 1, delay=True).parameters, [2, 3, 0.4, 25, 0.01], rtol=1e-4)
     # A dead time, where the phase turns no more than a few times.
     late = th.MeasuredResponse.given(OMEGA[:42], 3 * np.exp(-0.2 * s[:42]) / (1 + 4 * s[:42]))
     np.testing.assert_allclose(th.process(late, "p1d").parameters, [3, 4, 0.2], rtol=1e-5)

@@ -23,6 +23,8 @@ const LEAST_DAMPING: f64 = 1e-4;
 const LARGEST_DAMPING: f64 = 1e3;
 /// The largest ratio to what it must stay near to.
 const NEAR: f64 = 1.5;
+/// The longest dead time to start from, as a fraction of the longest log.
+pub(super) const LATEST: f64 = 0.25;
 /// A dead time is at most this fraction of the longest log.
 const LONGEST_DEAD_TIME: f64 = 0.9;
 
@@ -314,6 +316,15 @@ impl<'a> ProcessObjective<'a> {
             }
         }
         gap
+    }
+
+    /// Dead times of an input to start from: none, so many from the shortest time to a part of the longest, and of
+    /// points that by which the phase falls towards the highest.
+    pub(super) fn dead_times(&self, input: usize, count: usize) -> Vec<f64> {
+        let latest = (LATEST * self.longest).max(2.0 * self.shortest);
+        let late = self.points.get(input).and_then(ResponsePoints::group_delay);
+        let late = late.filter(|seconds| *seconds < LONGEST_DEAD_TIME * self.longest);
+        std::iter::once(0.0).chain(spread(self.shortest, latest, count)).chain(late).collect()
     }
 
     /// The shortest time constant that is looked for.

@@ -33,8 +33,6 @@ use crate::model::{Parts, ProcessStructure, polynomial};
 /// The number of rates of the first filters, and of dead times, from the shortest to the longest that are evaluated.
 const RATES: usize = 8;
 const DEAD_TIMES: usize = 6;
-/// The longest dead time, as a fraction of the longest log.
-const LATEST: f64 = 0.25;
 /// The fastest rate times the shortest step, and the slowest times the longest log.
 const FASTEST: f64 = 1.0;
 const SLOWEST: f64 = 2.0;
@@ -101,10 +99,8 @@ fn one_input(
 ) -> Vec<Candidate> {
     let (short, long) = (objective.shortest(), objective.longest());
     let own = Rounds { objective, input, structure, target };
-    let mut dead_times = vec![0.0];
-    if structure.has_dead_time() {
-        dead_times.extend(spread(short, (LATEST * long).max(2.0 * short), DEAD_TIMES));
-    }
+    let dead_times =
+        if structure.has_dead_time() { objective.dead_times(input, DEAD_TIMES) } else { vec![0.0] };
     let mut tried: Vec<Candidate> = Vec::new();
     for rate in spread(SLOWEST / long, FASTEST / short, RATES) {
         for &dead_time in &dead_times {

@@ -2,7 +2,7 @@
 
 use thetahat_numerics::optimize::{Deadline, Found, Monitor, Objective, Search, search};
 
-use super::objective::{ProcessObjective, spread};
+use super::objective::{LATEST, ProcessObjective, spread};
 use super::refined;
 use crate::Error;
 use crate::model::ProcessStructure;
@@ -10,9 +10,7 @@ use crate::model::ProcessStructure;
 /// Time constants and dead times of the grid.
 const TIME_CONSTANTS: usize = 8;
 const DEAD_TIMES: usize = 6;
-/// The longest dead time of the grid, as a fraction of the longest log.
-const LATEST: f64 = 0.25;
-/// The shortest time constant likewise.
+/// The shortest time constant of the grid, as a fraction of the longest log.
 const FASTEST: f64 = 1e-3;
 /// How many candidates are searched from.
 const SEARCHED: usize = 2;
@@ -243,17 +241,15 @@ fn first_grid(objective: &mut ProcessObjective<'_>) -> Vec<Vec<f64>> {
     let sweeps = if places.len() > 1 { 2 } else { 1 };
     let mut remaining = sweeps * places.len();
     for _ in 0..sweeps {
-        for (shape, dead_time) in &places {
+        for (input, (shape, dead_time)) in places.iter().enumerate() {
             candidates.clear();
             let shapes: Vec<Option<f64>> = if shape.is_empty() {
                 vec![None]
             } else {
                 spread(fastest, long.max(2.0 * fastest), TIME_CONSTANTS).map(Some).collect()
             };
-            let mut dead_times = vec![0.0];
-            if dead_time.is_some() {
-                dead_times.extend(spread(short, (LATEST * long).max(2.0 * short), DEAD_TIMES));
-            }
+            let dead_times =
+                if dead_time.is_some() { objective.dead_times(input, DEAD_TIMES) } else { vec![0.0] };
             for tau in shapes {
                 for seconds in &dead_times {
                     let mut candidate = start.clone();

@@ -3,6 +3,9 @@
 use crate::respond::Correlation;
 use crate::respond::process::Points;
 
+/// How many pairs of points at the highest frequencies tell a dead time.
+const HIGHEST: usize = 7;
+
 /// Measured points of the frequency response from one input.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ResponsePoints {
@@ -25,6 +28,20 @@ impl ResponsePoints {
     /// As a process takes them.
     pub(super) fn at(&self) -> Points<'_> {
         (&self.frequencies, self.held.then_some(self.sample_time))
+    }
+
+    /// -d phase/d omega in seconds over the highest frequencies, the median of some pairs of neighbours: there lags
+    /// have turned the phase as far as they can, and a dead time alone turns it further. None where it does not fall.
+    pub(super) fn group_delay(&self) -> Option<f64> {
+        let pairs = self.frequencies.windows(2).zip(self.values.windows(2)).rev().take(HIGHEST);
+        let slope = |(at, values): (&[f64], &[[f64; 2]])| {
+            let [[a, b], [c, d]] = [values[0], values[1]];
+            // The angle of the quotient of the two.
+            -(d * a - c * b).atan2(c * a + d * b) / (at[1] - at[0])
+        };
+        let mut slopes: Vec<f64> = pairs.map(slope).filter(|slope| slope.is_finite()).collect();
+        slopes.sort_by(f64::total_cmp);
+        slopes.get(slopes.len() / 2).copied().filter(|slope| *slope > 0.0)
     }
 
     /// Real and imaginary parts, times their weights.

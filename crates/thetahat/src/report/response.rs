@@ -2,10 +2,12 @@
 
 use std::f64::consts::PI;
 
-use super::schema::{Data, Missing};
+use super::schema::{Data, Estimation, Missing};
 use crate::Error;
-use crate::estimate::ResponsePoints;
+use crate::data::Offset;
+use crate::estimate::{Criteria, Procedure, ResponsePoints};
 use crate::figures::short;
+use crate::model::Signal;
 use crate::respond::{FrequencyPoint, FrequencyResponse};
 use crate::spectrum::MeasuredResponse;
 
@@ -42,6 +44,43 @@ pub(super) fn from_inputs<'r>(
         })
     };
     names.iter().map(of).collect()
+}
+
+/// Refuses what was asked for though logs alone have it.
+///
+/// # Errors
+/// [`Error::Argument`] for the first that was given.
+pub(super) fn refuse(of_logs: &[(&str, bool)]) -> Result<(), Error> {
+    match of_logs.iter().find(|(_, given)| *given) {
+        Some((name, _)) => {
+            Err(Error::argument(name, "a frequency response has no rows, levels or states; leave it out"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Channels of these names; levels are not in a response.
+pub(super) fn signals(names: &[String]) -> Vec<Signal> {
+    names.iter().map(|name| Signal { name: name.clone(), offset: Offset::default() }).collect()
+}
+
+/// The figures of a fit of so many parameters, whose errors at so many values have this mean square.
+pub(super) fn estimation(
+    procedure: Procedure,
+    (samples, mse): (usize, f64),
+    parameters: usize,
+    condition: Option<f64>,
+) -> Estimation {
+    Estimation {
+        procedure,
+        initial: None,
+        level: None,
+        slope: None,
+        samples,
+        mse,
+        criteria: Criteria::new(mse, parameters, samples),
+        condition,
+    }
 }
 
 /// The points of the response from an input, and what each is multiplied by.
@@ -89,13 +128,14 @@ pub(super) fn data(response: &MeasuredResponse, channels: impl Iterator<Item = S
     }
 }
 
-/// What a reader should know of the points, and of errors whose mean square in variances of the points is `mse`.
-pub(super) fn warnings(response: &MeasuredResponse, mse: f64) -> Vec<String> {
+/// What a reader should know of the points, and of errors whose mean square is `mse`, in variances of the points if these
+/// are known.
+pub(super) fn warnings(response: &MeasuredResponse, mse: f64, known: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     if response.bands.honest == Some(false) {
         warnings.push(format!("the bands of the response are not honest: {}", response.bands.reason));
     }
-    if mse > MISSED {
+    if known && mse > MISSED {
         warnings.push(format!(
             "the response is missed by {} times the standard deviations of its points: the structure is not the whole truth, or they are \
              too small",

@@ -6,10 +6,10 @@ use thetahat_numerics::optimize::Monitor;
 use super::{EquationsPlan, profiled, something_unknown, warnings};
 use crate::Error;
 use crate::estimate::equations::{EquationsPoint, EquationsResponse, ResponseLikelihood, largest_likelihood};
-use crate::estimate::{Criteria, EquationsOutcome, Procedure};
+use crate::estimate::{EquationsOutcome, Procedure};
 use crate::model::{EquationsModel, GreyBox};
-use crate::report::response::{data, fitted, variance, warnings as of_response};
-use crate::report::schema::{Estimation, Report};
+use crate::report::response::{data, estimation, fitted, refuse, variance, warnings as of_response};
+use crate::report::schema::Report;
 use crate::respond::equations::Failure;
 use crate::spectrum::MeasuredResponse;
 
@@ -85,14 +85,11 @@ pub fn fit_equations_to_response(
     plan: &EquationsPlan,
     monitor: Monitor<'_>,
 ) -> Result<Report, Error> {
-    let of_logs = [
+    refuse(&[
         ("estimate", !plan.estimate.is_empty()),
         ("validate", !plan.validate.is_empty()),
         ("split", plan.split.is_some()),
-    ];
-    if let Some((name, _)) = of_logs.iter().find(|(_, given)| *given) {
-        return Err(Error::argument(name, "a frequency response has no rows; leave it out"));
-    }
+    ])?;
     something_unknown(model)?;
     let model = model.clone().with_noises_as_they_start();
     if model.parameters().is_empty() {
@@ -137,26 +134,19 @@ pub fn fit_equations_to_response(
     let unknown = unknown.map(|(index, unknown)| unknown.reported(found.covariance[(index, index)].sqrt()));
     // In variances of the points, as of processes.
     let mse = if known { relative } else { relative * RELATIVE * RELATIVE };
-    let estimation = Estimation {
-        procedure: Procedure::from(EquationsOutcome {
-            log_likelihood: -found.value,
-            nis: None,
-            covariance_factor: factor,
-            unknown: unknown.collect(),
-            profile,
-            starts: Vec::new(),
-            search: found.search,
-        }),
-        initial: None,
-        level: None,
-        slope: None,
-        samples: found.samples,
-        mse,
-        criteria: Criteria::new(mse, found.values.len(), found.samples),
-        condition: Some(found.condition),
-    };
+    let procedure = Procedure::from(EquationsOutcome {
+        log_likelihood: -found.value,
+        nis: None,
+        covariance_factor: factor,
+        unknown: unknown.collect(),
+        profile,
+        starts: Vec::new(),
+        search: found.search,
+    });
+    let condition = Some(found.condition);
+    let estimation = estimation(procedure, (found.samples, mse), found.values.len(), condition);
     let mut words = warnings::of_fit(&own, &estimation, &[]);
-    words.extend(of_response(response, if known { relative } else { 0.0 }));
+    words.extend(of_response(response, relative, known));
     let channels = model.inputs().iter().chain(model.outputs()).cloned();
     let mut report = Report::new(data(response, channels), own, estimation);
     report.warnings.extend(words);

@@ -4,12 +4,12 @@ use thetahat_numerics::optimize::Monitor;
 
 use super::{ProcessPlan, model};
 use crate::Error;
-use crate::data::Offset;
-use crate::estimate::{Criteria, ResponsePoints, least_response_errors};
-use crate::model::{ProcessModel, Signal};
+use crate::estimate::{ResponsePoints, least_response_errors};
+use crate::model::ProcessModel;
 use crate::report::Report;
-use crate::report::response::{data, from_inputs, noise_variance, points, warnings as of_response};
-use crate::report::schema::Estimation;
+use crate::report::response::{
+    data, estimation, from_inputs, noise_variance, points, refuse, signals, warnings as of_response,
+};
 use crate::spectrum::MeasuredResponse;
 
 /// Finds the process whose frequency response, with an input that is held from sample to sample or, of a response in
@@ -64,42 +64,27 @@ pub fn fit_process_to_response(
     let inputs = measured.iter().filter_map(|own| own.input.clone()).collect();
     let plan = &ProcessPlan { inputs, output: response.output.clone(), ..plan.clone() };
     plan.check()?;
-    let of_logs = [
+    refuse(&[
         ("estimate", !plan.estimate.is_empty()),
         ("validate", !plan.validate.is_empty()),
         ("split", plan.split.is_some()),
         ("offset", !plan.offsets.is_empty()),
         ("trend", plan.trend),
         ("initial", plan.free_start == Some(true)),
-    ];
-    if let Some((name, _)) = of_logs.iter().find(|(_, given)| *given) {
-        return Err(Error::argument(
-            name,
-            "a frequency response has no rows, levels or states; leave it out",
-        ));
-    }
+    ])?;
     let points: Vec<ResponsePoints> = measured.iter().map(|own| points(own, response)).collect();
     let structures = plan.each();
     let names = ProcessModel::names(&structures, &plan.inputs);
     let found = least_response_errors(&structures, &names, &points, &plan.search, monitor)?;
-    let signal = |name: &String| Signal { name: name.clone(), offset: Offset::default() };
-    let inputs: Vec<Signal> = plan.inputs.iter().map(signal).collect();
+    let inputs = signals(&plan.inputs);
     let own = model(plan, response.sample_time, inputs, structures, &names, (false, &found))?;
     // What e is in the time of the samples the noise of the response says, if it does.
     let own = ProcessModel { noise_variance: noise_variance(response), degrees_of_freedom: None, ..own };
     let data = data(response, plan.inputs.iter().chain([&plan.output]).cloned());
-    let estimation = Estimation {
-        initial: None,
-        level: None,
-        slope: None,
-        samples: found.samples,
-        mse: found.mse,
-        criteria: Criteria::new(found.mse, names.len(), found.samples),
-        condition: found.condition,
-        procedure: found.outcome.of_response(),
-    };
+    let values = (found.samples, found.mse);
+    let estimation = estimation(found.outcome.of_response(), values, names.len(), found.condition);
     let mut warnings = super::warnings::of_parameters(&own, f64::INFINITY);
-    let missed = if points.iter().all(|own| own.known) { found.mse } else { 0.0 };
-    warnings.extend(of_response(response, missed));
+    let known = points.iter().all(|own| own.known);
+    warnings.extend(of_response(response, found.mse, known));
     Ok(Report { warnings, ..Report::new(data, own, estimation) })
 }

@@ -6,11 +6,12 @@ use thetahat_numerics::optimize::Monitor;
 
 use super::StateSpacePlan;
 use crate::Error;
-use crate::data::Offset;
-use crate::estimate::{Criteria, ResponsePoints, SharedPoles, shared_poles};
-use crate::model::{ContinuousStateSpaceModel, Model, Signal, StateSpace, StateSpaceModel};
-use crate::report::response::{data, from_inputs, noise_variance, points, warnings as of_response};
-use crate::report::schema::{Estimation, Report};
+use crate::estimate::{ResponsePoints, SharedPoles, shared_poles};
+use crate::model::{ContinuousStateSpaceModel, Model, StateSpaceModel};
+use crate::report::response::{
+    data, estimation, from_inputs, noise_variance, points, refuse, signals, warnings as of_response,
+};
+use crate::report::schema::Report;
 use crate::respond::FrequencyResponse;
 use crate::spectrum::MeasuredResponse;
 
@@ -73,7 +74,7 @@ pub fn fit_states_to_response(
     let outputs = vec![response.output.clone()];
     let plan = &StateSpacePlan { inputs, outputs, ..plan.clone() };
     plan.check()?;
-    let of_logs = [
+    refuse(&[
         ("estimate", !plan.estimate.is_empty()),
         ("validate", !plan.validate.is_empty()),
         ("split", plan.split.is_some()),
@@ -82,10 +83,7 @@ pub fn fit_states_to_response(
         ("future", plan.subspace.future.is_some()),
         ("refine", plan.refine.is_some()),
         ("na", plan.arx.is_some()),
-    ];
-    if let Some((name, _)) = of_logs.iter().find(|(_, given)| *given) {
-        return Err(Error::argument(name, "a frequency response has no rows and no past; leave it out"));
-    }
+    ])?;
     if response.continuous && !plan.delays.is_empty() {
         let message = "a response in continuous time has no samples that an input could wait; leave it out";
         return Err(Error::argument("nk", message));
@@ -95,22 +93,12 @@ pub fn fit_states_to_response(
         measured.iter().zip(&delays).map(|(own, delay)| ahead(own, *delay, response)).collect();
     let orders = plan.orders.clone().unwrap_or(1..=HIGHEST);
     let found = shared_poles(&points, &orders, plan.subspace.feedthrough, &plan.search, monitor)?;
-    let channels = plan.inputs.iter().chain(&plan.outputs).cloned();
-    let data = data(response, channels);
-    let estimation = Estimation {
-        initial: None,
-        level: None,
-        slope: None,
-        samples: found.samples,
-        mse: found.mse,
-        criteria: Criteria::new(found.mse, found.free, found.samples),
-        condition: None,
-        procedure: found.outcome.clone().into(),
-    };
+    let data = data(response, plan.channels().map(str::to_owned));
+    let values = (found.samples, found.mse);
+    let estimation = estimation(found.outcome.clone().into(), values, found.free, None);
     let order = found.matrices.f.nrows();
     let mut warnings = Vec::new();
-    let given = plan.orders.as_ref().map_or(HIGHEST, |orders| *orders.end());
-    if order == given && orders.start() < orders.end() {
+    if order == *orders.end() && orders.start() < orders.end() {
         warnings.push(format!(
             "the order that fits best, {order}, is the highest that was compared: a higher one may fit better; widen the range"
         ));
@@ -121,30 +109,24 @@ pub fn fit_states_to_response(
                 .to_owned(),
         );
     }
-    let missed = if points.iter().all(|own| own.known) { found.mse } else { 0.0 };
-    warnings.extend(of_response(response, missed));
+    let known = points.iter().all(|own| own.known);
+    warnings.extend(of_response(response, found.mse, known));
     let model = model(found, plan, delays, response)?;
     Ok(Report { warnings, ..Report::new(data, model, estimation) })
 }
 
 /// The points of an input as they would be if it did not wait.
 fn ahead(own: &FrequencyResponse, delay: usize, response: &MeasuredResponse) -> ResponsePoints {
-    let mut points = points(own, response);
+    // At the highest frequency that samples have they tell a size alone, and s is infinite.
+    let highest = PI / response.sample_time * (1.0 - 1e-9);
+    let mut own = own.clone();
+    own.points.retain(|point| response.continuous || point.frequency < highest);
+    let mut points = points(&own, response);
     let seconds = delay as f64 * response.sample_time;
     for (value, frequency) in points.values.iter_mut().zip(&points.frequencies) {
         let (sine, cosine) = (frequency * seconds).sin_cos();
         let [re, im] = *value;
         *value = [re * cosine - im * sine, re * sine + im * cosine];
-    }
-    if points.held {
-        // At this frequency samples tell a size alone, and s is infinite.
-        let highest = PI / points.sample_time * (1.0 - 1e-9);
-        let inside: Vec<bool> = points.frequencies.iter().map(|own| *own < highest).collect();
-        let mut kept = inside.iter();
-        points.values.retain(|_| kept.next().copied().unwrap_or(true));
-        let mut kept = inside.iter();
-        points.weights.retain(|_| kept.next().copied().unwrap_or(true));
-        points.frequencies.retain(|own| *own < highest);
     }
     points
 }
@@ -155,16 +137,14 @@ fn model(
     delays: Vec<usize>,
     response: &MeasuredResponse,
 ) -> Result<Model, Error> {
-    let signal = |name: &String| Signal { name: name.clone(), offset: Offset::default() };
-    let inputs = plan.inputs.iter().map(signal).collect();
-    let outputs = plan.outputs.iter().map(signal).collect();
+    let (inputs, outputs) = (signals(&plan.inputs), signals(&plan.outputs));
     let SharedPoles { matrices, covariance, free, .. } = found;
     if response.continuous {
         let channels = (inputs, outputs);
         let model = ContinuousStateSpaceModel::of_sines(channels, &matrices, free, covariance)?;
         return Ok(model.into());
     }
-    let mut matrices: StateSpace = matrices;
+    let mut matrices = matrices;
     // What e is in the time of the samples the noise of the response says, if it does.
     matrices.noise_covariance[(0, 0)] = noise_variance(response);
     let model = StateSpaceModel::new((inputs, outputs), delays, &matrices, free, None)?;

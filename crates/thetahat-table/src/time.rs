@@ -122,9 +122,9 @@ pub(super) enum Clock {
     /// Numbers in a unit, returned as seconds since the first one.
     Since {
         unit: Unit,
-        /// The first one, and exactly if it is whole.
+        /// The first one, and its whole part and fraction if it has them.
         first: f64,
-        whole: Option<i64>,
+        parts: Option<(i64, f64)>,
         /// When that is.
         instant: Timestamp,
     },
@@ -225,15 +225,15 @@ impl Clock {
             Written::Numbers(Unit::Seconds) => Self::decide(field, None, numbers),
             Written::Numbers(unit) => number(field, numbers).map(|_| Self::Numbers(*unit)),
             Written::Since(unit, origin) => {
-                let (first, whole) = (number(field, numbers)?, whole_number(field));
-                let nanoseconds = match whole {
-                    Some(whole) => i128::from(whole) * unit.nanoseconds(),
-                    // Spreadsheets keep microseconds.
-                    None => (first * (unit.nanoseconds() / 1_000) as f64).round() as i128 * 1_000,
-                };
+                let first = number(field, numbers)?;
+                let parts = whole_and_fraction(field, first);
+                let (whole, fraction) = parts.unwrap_or((0, first));
+                // Spreadsheets keep microseconds.
+                let rest = (fraction * (unit.nanoseconds() / 1_000) as f64).round() as i128 * 1_000;
+                let nanoseconds = i128::from(whole) * unit.nanoseconds() + rest;
                 let instant = Timestamp::from_nanosecond(nanoseconds + origin)
                     .map_err(|_| format!("{} is no time since 1970 in {}", quoted(field), unit.name()))?;
-                Ok(Self::Since { unit: *unit, first, whole, instant })
+                Ok(Self::Since { unit: *unit, first, parts, instant })
             }
             Written::Durations if duration(field).is_some() => Ok(Self::Durations),
             Written::Durations => Self::decide(field, None, numbers),
@@ -286,10 +286,11 @@ impl Clock {
         Ok(match self {
             Self::Seconds | Self::Numbers(_) | Self::Durations => self,
             Self::Calendar { format, .. } => Self::Calendar { format, first: from },
-            Self::Since { unit, first, instant, .. } => {
+            Self::Since { unit, first, parts, instant } => {
                 let ahead =
                     (from.as_nanosecond() - instant.as_nanosecond()) as f64 / unit.nanoseconds() as f64;
-                Self::Since { unit, first: first + ahead, whole: None, instant: from }
+                let parts = parts.map(|(whole, fraction)| (whole, fraction + ahead));
+                Self::Since { unit, first: first + ahead, parts, instant: from }
             }
         })
     }
@@ -316,11 +317,16 @@ impl Clock {
             Self::Durations => duration(field).ok_or_else(|| {
                 format!("{} is no time as in 27:05:10.5, as the first ones are; correct it", quoted(field))
             }),
-            Self::Since { unit, first, whole, .. } => match (whole_number(field), whole) {
-                // Whole numbers are exact: nanoseconds since 1970 have more digits than a number has.
-                (Some(now), Some(first)) => Ok(unit.seconds((i128::from(now) - i128::from(*first)) as f64)),
-                _ => Ok(unit.seconds(number(field, numbers)? - first)),
-            },
+            Self::Since { unit, first, parts, .. } => {
+                let now = number(field, numbers)?;
+                Ok(unit.seconds(match (whole_and_fraction(field, now), parts) {
+                    // Exact: times since 1970 have more digits than a number has.
+                    (Some((whole, fraction)), Some((first, part))) => {
+                        (i128::from(whole) - i128::from(*first)) as f64 + (fraction - part)
+                    }
+                    _ => now - first,
+                }))
+            }
             Self::Calendar { format, first } => {
                 let now = instant(field, format.as_deref())?;
                 // Whole nanoseconds up to here: as seconds since 1970 both would have lost their last digits.
@@ -329,6 +335,9 @@ impl Clock {
         }
     }
 }
+
+/// More digits than these of a fraction are not read exactly.
+const MOST_DIGITS: usize = 15;
 
 /// The message for a time that no calendar has.
 pub(super) const NO_DATE: &str = "the time is no date between the years -9999 and 9999; correct it";
@@ -361,9 +370,21 @@ pub(super) fn duration(field: &[u8]) -> Option<f64> {
     Some(3600.0 * whole(hours, None)? + 60.0 * whole(minutes, below)? + seconds)
 }
 
-/// A number that has nothing but digits.
-fn whole_number(field: &[u8]) -> Option<i64> {
-    std::str::from_utf8(field).ok()?.parse().ok()
+/// The whole part and the fraction of a number that has nothing but digits and what separates these two.
+fn whole_and_fraction(field: &[u8], value: f64) -> Option<(i64, f64)> {
+    let text = std::str::from_utf8(field).ok()?;
+    let (whole, digits) = text.split_once(['.', ',']).unwrap_or((text, ""));
+    let whole: i64 = whole.parse().ok()?;
+    let fraction = match digits {
+        "" => 0.0,
+        _ if whole < 0 || digits.len() > MOST_DIGITS || !digits.bytes().all(|byte| byte.is_ascii_digit()) => {
+            return None;
+        }
+        _ => digits.parse::<u64>().ok()? as f64 / 10.0_f64.powi(digits.len() as i32),
+    };
+    // What separates them may stand for thousands.
+    let is_value = (whole as f64 + fraction - value).abs() <= 4.0 * f64::EPSILON * value.abs();
+    is_value.then_some((whole, fraction))
 }
 
 /// A time that is a number.
@@ -450,6 +471,22 @@ mod tests {
     fn numbers_are_seconds() {
         assert_eq!(seconds("5", None, "5.25"), Ok(5.25));
         assert_eq!(seconds("2024", None, "2025"), Ok(2025.0));
+    }
+
+    #[test]
+    fn decimals_of_seconds_since_1970_keep_their_digits() {
+        let since = |decimal_comma: bool, first: &str, then: &str| {
+            let numbers = Numbers::new(decimal_comma, &[]);
+            let written = Written::Since(Unit::Seconds, 0);
+            Clock::begin(first.as_bytes(), &written, &numbers)?.read(then.as_bytes(), &numbers)
+        };
+        assert_eq!(since(false, "1700000000.0", "1700000000.1"), Ok(0.1));
+        assert_eq!(since(false, "1700000000", "1700086400.000001"), Ok(86_400.000_001));
+        assert_eq!(since(true, "1700000000,25", "1700000001,125"), Ok(0.875));
+        assert_eq!(since(false, "1700000000.999999", "1700000001.000001"), Ok(1.0 + (0.000_001 - 0.999_999)));
+        // In other forms the number itself.
+        assert_eq!(since(false, "1.7e9", "1700000000.5"), Ok(0.5));
+        assert!(since(false, "1700000000", "abc").is_err());
     }
 
     #[test]

@@ -152,6 +152,12 @@ fn tables_without_names_and_of_magnitude_and_phase_are_read() {
         let report = folder.fit(&format!("--from {file} --structure rc2"));
         near(value(&report, "R0")[0], 0.015, 1e-6);
     }
+    // A row of units that looks like a comment, and a further column of words.
+    let rows =
+        impedance().lines().skip(1).map(|row| format!("ok;{}\n", row.replace(',', ";"))).collect::<String>();
+    folder.write("rig.csv", format!("state;Freq;Zreal;Zimag;Zmod\n#;Hz;ohm;ohm;ohm\n{rows}"));
+    let report = folder.fit("--from rig.csv --skip-rows 1 --delimiter ; --columns=-im=Zimag --structure rc2");
+    near(value(&report, "R0")[0], 0.015, 1e-6);
     let report = folder.fit("--from bare.csv --columns hz=1,re=2,im=3 --structure rc2");
     near(value(&report, "R0")[0], 0.015, 1e-6);
 }
@@ -191,6 +197,7 @@ fn what_is_no_frequency_response_is_refused_and_nothing_written() {
         ("--grey cell.toml --estimate 1..5", 2, "a frequency response has no rows"),
         ("--grey cell.toml --known r7=1", 2, "no such unknown parameter"),
         ("--na 2 --nb 2", 2, "from"),
+        ("--structure rc2 --header-row 99", 3, "99"),
     ] {
         refused(&folder, &format!("fit --from z.csv {line} --report r.json"), Some(code), words);
     }

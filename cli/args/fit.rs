@@ -21,7 +21,7 @@ pub(crate) struct FitArguments {
     #[arg(
         long,
         value_name = "RESPONSE",
-        conflicts_with_all = ["logs", "each", "html", "ClockArguments", "LogArguments"]
+        conflicts_with_all = ["logs", "each", "html", "ClockArguments"]
     )]
     pub(crate) from: Option<PathBuf>,
     /// The frequencies of the response that are fitted to, in rad/s [default: all]

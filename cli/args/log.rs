@@ -43,7 +43,7 @@ impl Names {
 }
 
 /// How a log is written.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, PartialEq, Args)]
 pub(crate) struct LogArguments {
     /// What separates fields: a character, tab, or blanks for runs of them [default: recognised among comma, semicolon,
     /// tab and blanks]

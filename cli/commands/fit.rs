@@ -63,7 +63,8 @@ fn found(job: &FitJob, telling: &Telling) -> Result<Identified, Failure> {
             Some(Equations::File(path)) => Some(of_text(path, &job.template)?),
             _ => None,
         };
-        let response = response::read(path, &job.template.columns, channels(job, equations.as_ref()))?;
+        let named = channels(job, equations.as_ref());
+        let response = response::read(path, job.table.as_ref(), &job.template.columns, named)?;
         let response = match job.band {
             Some([low, high]) => response.within(low, high).map_err(|error| Failure::option(&error))?,
             None => response,

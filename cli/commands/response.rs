@@ -70,10 +70,12 @@ const NAMES: [(Role, &[&str]); 8] = [
 ];
 
 /// A measured response: the document that `spectrum` wrote, or a table of points of sines in continuous time. `columns`
-/// says which column is which, a role of [`ROLES`] and a name each; those that it does not name go by their names.
+/// says which column is which, a role of [`ROLES`] and a name each; those that it does not name go by their names. How
+/// a table is written `format` says, if that was said.
 /// `channels` are what input and output are called.
 pub(super) fn read(
     path: &Path,
+    format: Option<&Options>,
     columns: &[(String, String)],
     [input, output]: [&str; 2],
 ) -> Result<MeasuredResponse, Failure> {
@@ -81,11 +83,16 @@ pub(super) fn read(
         if !columns.is_empty() {
             return Err(Failure::usage("--columns is for tables and templates; the response is a document"));
         }
+        if format.is_some() {
+            return Err(Failure::usage(
+                "options of the log format are for tables; the response is a document",
+            ));
+        }
         return stored::response(path);
     }
     let file = path.display().to_string();
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
-    let reader = Reader::open(path, &Options::default())?;
+    let reader = Reader::open(path, format.unwrap_or(&Options::default()))?;
     let roles = roles(reader.names(), columns).map_err(bad)?;
     let selection =
         Selection { columns: roles.iter().map(|(_, place)| *place).collect(), ..Selection::default() };

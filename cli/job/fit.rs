@@ -6,7 +6,7 @@ use thetahat::plan::{FitOptions, Fitted};
 use thetahat::templates::Template;
 
 use super::{LogJob, TemplateOptions};
-use crate::args::{FitArguments, template_name};
+use crate::args::{FitArguments, LogArguments, template_name};
 use crate::failure::Failure;
 use crate::memory::PerValue;
 
@@ -31,6 +31,8 @@ pub(crate) struct FitJob {
     pub(crate) template: TemplateOptions,
     /// A frequency response: a document, or a table.
     pub(crate) response: Option<PathBuf>,
+    /// How the table is written, if that was said.
+    pub(crate) table: Option<thetahat_table::Options>,
     /// From which to which of its frequencies, in rad/s.
     pub(crate) band: Option<[f64; 2]>,
     /// Whether the logs are read part by part.
@@ -105,9 +107,12 @@ impl FitJob {
         if arguments.logs.is_empty() && arguments.from.is_none() && arguments.each.list.is_none() {
             return Err(Failure::usage("name the logs to fit the model to"));
         }
+        let log = LogJob::resolve(&arguments.log, &arguments.clock)?;
+        let is_table_described = arguments.from.is_some() && arguments.log != LogArguments::default();
         let mut job = Self {
             paths: arguments.logs.clone(),
-            log: LogJob::resolve(&arguments.log, &arguments.clock)?,
+            table: is_table_described.then(|| log.options.clone()),
+            log,
             equations,
             template,
             response: arguments.from.clone(),

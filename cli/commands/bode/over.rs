@@ -33,7 +33,7 @@ pub(super) fn over(arguments: &BodeArguments, path: &Path, line: &str) -> Result
     let [input, output] = stored.first().map_or(["u".to_owned(), "y".to_owned()], |(_, model)| {
         [name(model.inputs(), "u"), name(model.outputs(), "y")]
     });
-    let found = response::read(path, &[], [&input, &output])?;
+    let found = response::read(path, None, &[], [&input, &output])?;
     let mut models = Vec::new();
     for (report, model) in &stored {
         models.push((report.display().to_string(), of_output(report, model, &found)?));

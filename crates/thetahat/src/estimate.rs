@@ -60,8 +60,10 @@ mod prediction_error;
 mod predictor;
 mod procedure;
 mod process;
+mod projection;
 mod refinement;
 mod reflection;
+mod response_points;
 mod restart;
 mod robust;
 mod shared_poles;
@@ -110,11 +112,11 @@ use procedure::FilteredCovariance;
 pub(crate) use procedure::NullDistribution;
 pub use process::ProcessOutcome;
 pub(crate) use process::{
-    Background, FreeRun, ProcessEstimate, ResponsePoints, least_free_run, least_free_run_from,
-    least_response_errors,
+    Background, FreeRun, ProcessEstimate, least_free_run, least_free_run_from, least_response_errors,
 };
 pub use refinement::{Refine, RefinementOutcome};
 pub(crate) use refinement::{Refinement, RefinementStart, refined};
+pub(crate) use response_points::ResponsePoints;
 pub use robust::{Loss, Robust, RobustOutcome};
 pub use shared_poles::SharedPolesOutcome;
 pub(crate) use shared_poles::{SharedPoles, shared_poles};
@@ -125,7 +127,7 @@ pub(crate) use subspace::{
 };
 pub use thetahat_numerics::regression::Solver;
 pub(crate) use thinning::{LONG, segments_of_starts, thinned_to};
-pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products};
+pub(crate) use uncertainty::{Autoregression, autoregression, backward_filtered_products, coloured};
 pub use vector_arx::{Coupling, VectorArxInputs, VectorArxOptions, VectorArxOutcome, VectorArxScore};
 pub(crate) use vector_arx::{VectorArxEstimate, vector_arx, vector_arx_of_sums};
 

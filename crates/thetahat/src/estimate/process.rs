@@ -26,12 +26,13 @@ use thetahat_numerics::optimize::{Algorithm, Deadline, Found, Monitor, Search, S
 use thetahat_numerics::regression::{Span, condition, sum_of_squares};
 
 use super::prediction_error::backward_products;
+use super::response_points::ResponsePoints;
 use super::uncertainty::{Autoregression, coloured, restricted};
 use crate::Error;
 use crate::model::{Parts, ProcessStructure, is_covariance};
 use crate::respond::process::HeldLog;
+pub(crate) use objective::Background;
 use objective::ProcessObjective;
-pub(crate) use objective::{Background, ResponsePoints};
 
 /// How a process was found: by the least errors of its free run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -265,11 +266,7 @@ fn of_points(
 ) -> Uncertainty {
     let colour = Autoregression { monic: vec![1.0], variance };
     let independent = root.map(|root| &root * root.transpose());
-    let inverse = independent.as_ref().map(|inverse| {
-        let correlated = inverse * spread * inverse;
-        // A covariance is symmetric to the bit.
-        0.5 * (&correlated + correlated.transpose())
-    });
+    let inverse = independent.as_ref().map(|inverse| coloured(inverse, 1.0, spread));
     let place = |index: usize| used.iter().position(|own| *own == index);
     let entry = |i: usize, j: usize| Some(inverse.as_ref()?[(place(i)?, place(j)?)]);
     let larger = if is_relative { variance } else { variance.max(1.0) };
@@ -350,7 +347,7 @@ fn uncertainty(
     });
     if objective.is_of_points() {
         let columns: Vec<&Vec<f64>> = used.iter().map(|place| &psi[*place]).collect();
-        let spread = DMatrix::from_row_slice(size, size, &objective.spread(&columns));
+        let spread = ResponsePoints::spread(objective.points(), &columns);
         let own = (variance, objective.is_relative());
         return Ok(of_points(root, &spread, &used, names.len(), own, condition));
     }

@@ -25,6 +25,7 @@ use thetahat_core::nalgebra::DMatrix;
 use thetahat_numerics::optimize::{Algorithm, Deadline, Found, Monitor, Search, Stopped, search};
 use thetahat_numerics::regression::{Span, sum_of_squares};
 
+use super::uncertainty::coloured;
 use super::{OrderScore, ResponsePoints};
 use crate::Error;
 use crate::model::{EntryCovariance, StateSpace};
@@ -73,11 +74,12 @@ pub(crate) struct SharedPoles {
 /// Fits models of these orders to the points of the response from each input, and takes that of the least MDL
 ///
 /// ```text
-/// V/l + p ln(N/l)  of known variances,   N/l ln(V/N) + p ln(N/l)  of relative errors
+/// N/l ln(V/N) + p ln(N/l)
 /// ```
 ///
 /// for p parameters and N values whose errors are alike in groups of l: the mean over points of the sum of their
-/// squared correlations with all others.
+/// squared correlations with all others. That the points come with their variances does not count: where a response is
+/// missed by more than these, each order would pay.
 ///
 /// # Errors
 /// [`Error::Undetermined`] if points are too few for the lowest order; [`Error::Data`] if squares leave the range of
@@ -116,13 +118,9 @@ pub(crate) fn shared_poles(
             if order < *orders.start() {
                 continue;
             }
-            let (values, free_values) = (samples as f64 / alike, free as f64);
-            let misfit = if objective.is_relative() {
-                values * (found.cost() / samples as f64).max(f64::MIN_POSITIVE).ln()
-            } else {
-                found.cost() / alike
-            };
-            let mdl = misfit + free_values * values.ln();
+            let values = samples as f64 / alike;
+            let mean = (found.cost() / samples as f64).max(f64::MIN_POSITIVE);
+            let mdl = values * mean.ln() + free as f64 * values.ln();
             match scores.iter_mut().find(|score| score.order == order) {
                 Some(score) => score.mdl = score.mdl.map(|own| own.min(mdl)),
                 None => scores.push(OrderScore { order, mdl: Some(mdl) }),
@@ -223,23 +221,13 @@ impl PolesObjective<'_> {
         let mut root = span.triangle().solve_upper_triangular(&DMatrix::identity(size, size))?;
         root.row_iter_mut().zip(&norms).for_each(|(mut row, norm)| row /= *norm);
         let inverse = &root * root.transpose();
-        let mut spread = DMatrix::zeros(size, size);
-        let mut first = 0;
-        for own in self.points() {
-            let rows = (0..own.frequencies.len()).map(|row| first + 2 * row);
-            let slopes: Vec<[f64; 2]> =
-                rows.flat_map(|row| psi.iter().map(move |column| [column[row], column[row + 1]])).collect();
-            spread +=
-                DMatrix::from_row_slice(size, size, &own.correlation.spread(&own.frequencies, &slopes, size));
-            first += 2 * own.frequencies.len();
-        }
+        let spread = ResponsePoints::spread(self.points(), &psi.iter().collect::<Vec<_>>());
         let variance = self.squares() / (self.count() - self.free_parameters()) as f64;
         let larger = if self.is_relative() { variance } else { variance.max(1.0) };
-        let covariance = larger * &inverse * spread * &inverse;
-        let symmetric = 0.5 * (&covariance + covariance.transpose());
-        let is_one = symmetric.iter().all(|value| value.is_finite())
-            && symmetric.diagonal().iter().all(|value| *value > 0.0);
-        is_one.then_some(symmetric)
+        let covariance = coloured(&inverse, larger, &spread);
+        let is_one = covariance.iter().all(|value| value.is_finite())
+            && covariance.diagonal().iter().all(|value| *value > 0.0);
+        is_one.then_some(covariance)
     }
 }
 

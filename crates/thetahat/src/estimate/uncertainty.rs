@@ -390,7 +390,7 @@ pub(crate) fn backward_filtered_products(
 }
 
 /// `L (sigma^2 S) L'`, `products` being S = sum zeta zeta'.
-pub(super) fn coloured(left: &DMatrix<f64>, variance: f64, products: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn coloured(left: &DMatrix<f64>, variance: f64, products: &DMatrix<f64>) -> DMatrix<f64> {
     let covariance = left * products * left.transpose() * variance;
     // Symmetric to the last bit.
     (&covariance + covariance.transpose()) * 0.5

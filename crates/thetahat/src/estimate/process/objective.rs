@@ -1,19 +1,19 @@
 //! The errors of a free run as a function of the shapes and dead times.
 
-mod points;
 mod signals;
 
 use std::ops::Range;
 
 use thetahat_numerics::optimize::Objective;
-use thetahat_numerics::regression::{Span, product, sum, sum_of_squares};
+use thetahat_numerics::regression::{Span, sum, sum_of_squares};
 
 use crate::Error;
+use crate::estimate::projection::{NormalEquations, Refusal, check_inside, draw_in};
+use crate::estimate::response_points::ResponsePoints;
 use crate::model::{Parts, ProcessStructure};
 use crate::respond::process::{
     HeldLog, free_sensitivities, modes, response_slopes, responses, run, sensitivities,
 };
-pub(crate) use points::ResponsePoints;
 
 /// Time constants lie between this fraction of the shortest step of the clock, and so many times the longest log.
 const SHORTEST: f64 = 1e-3;
@@ -61,15 +61,6 @@ impl Background {
     }
 }
 
-/// Why parameters have no cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refusal {
-    /// They are outside of their limits.
-    Outside,
-    /// The response is no number.
-    Overflow,
-}
-
 /// The least sum of squared errors that weights, level, slope and free responses leave, by the other parameters:
 /// ln(tau), ln(omega), ln(zeta), and the dead time in seconds, of one input after the other.
 ///
@@ -102,8 +93,7 @@ pub(super) struct ProcessObjective<'a> {
     first_states: Vec<f64>,
     residuals: Vec<f64>,
     span: Span,
-    matrix: Vec<f64>,
-    right: Vec<f64>,
+    equations: NormalEquations,
 }
 
 impl<'a> ProcessObjective<'a> {
@@ -192,8 +182,7 @@ impl<'a> ProcessObjective<'a> {
             offsets: Vec::new(),
             first_states: Vec::new(),
             span: Span::default(),
-            matrix: Vec::new(),
-            right: Vec::new(),
+            equations: NormalEquations::default(),
         }
     }
 
@@ -207,20 +196,8 @@ impl<'a> ProcessObjective<'a> {
         !self.points.is_empty()
     }
 
-    /// The sum of rho psi_k psi_l' over the points of each input, of columns of psi at all points
-    /// ([`Correlation::spread`](crate::respond::Correlation::spread)).
-    pub(super) fn spread(&self, psi: &[&Vec<f64>]) -> Vec<f64> {
-        let mut sum = vec![0.0; psi.len() * psi.len()];
-        let mut first = 0;
-        for points in self.points {
-            let rows = (0..points.frequencies.len()).map(|row| first + 2 * row);
-            let slopes: Vec<[f64; 2]> =
-                rows.flat_map(|row| psi.iter().map(move |column| [column[row], column[row + 1]])).collect();
-            let own = points.correlation.spread(&points.frequencies, &slopes, psi.len());
-            sum.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
-            first += 2 * points.frequencies.len();
-        }
-        sum
+    pub(super) fn points(&self) -> &'a [ResponsePoints] {
+        self.points
     }
 
     /// Holds the dead times, and keeps the shapes within a factor of [`NEAR`] of a point of them.
@@ -595,10 +572,7 @@ impl Objective for ProcessObjective<'_> {
     }
 
     fn evaluate(&mut self, point: &[f64]) -> Result<f64, Refusal> {
-        let inside = |(value, [low, high]): (&f64, [f64; 2])| *value >= low && *value <= high;
-        if !point.iter().zip(self.limits()).all(inside) {
-            return Err(Refusal::Outside);
-        }
+        check_inside(point, &self.limits())?;
         let mut parts: Vec<Parts<f64>> = self
             .places()
             .into_iter()
@@ -648,39 +622,24 @@ impl Objective for ProcessObjective<'_> {
         columns.iter_mut().for_each(|column| {
             self.span.take_from(column);
         });
-        self.right = columns.iter().map(|column| product(column, &self.residuals)).collect();
-        let limits = self.limits();
-        for (((column, right), value), [low, high]) in
-            columns.iter_mut().zip(&mut self.right).zip(&self.point).zip(limits)
-        {
-            // It would leave through the bound that it stands on.
-            if *value <= low && *right < 0.0 || *value >= high && *right > 0.0 {
-                column.fill(0.0);
-                *right = 0.0;
-            }
-        }
-        self.matrix =
-            columns.iter().flat_map(|left| columns.iter().map(|right| product(left, right))).collect();
+        self.equations = NormalEquations::new(columns, &self.residuals, &self.point, &self.limits());
         Ok(0.0)
     }
 
     fn matrix(&self) -> &[f64] {
-        &self.matrix
+        &self.equations.matrix
     }
 
     fn right(&self) -> &[f64] {
-        &self.right
+        &self.equations.right
     }
 
     fn is_outside(refusal: &Refusal) -> bool {
         *refusal == Refusal::Outside
     }
 
-    /// Moves parameters onto the bound that they would cross. They stay there from then on, see `linearize`.
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        for (value, [low, high]) in trial.iter_mut().zip(self.limits()) {
-            *value = value.clamp(low, high);
-        }
+        draw_in(trial, &self.limits());
         from != trial
     }
 }

@@ -87,16 +87,20 @@ impl PolesObjective<'_> {
             for column in self.linear_columns(input, poles) {
                 span.add(column);
             }
-            let values: Vec<Complex<f64>> =
-                own.values.iter().map(|[re, im]| Complex::new(*re, *im)).collect();
-            for (place, whole) in stacked.iter_mut().enumerate() {
-                let mut column = Vec::with_capacity(2 * values.len());
-                for ((s, value), weight) in self.at()[input].iter().zip(&values).zip(&own.weights) {
-                    let beside = of_place(poles, order, place, *s);
-                    sums[place] += beside.re;
-                    let product = -beside * *value * *weight;
-                    column.extend([product.re, product.im]);
+            let mut beside = vec![Vec::with_capacity(2 * own.values.len()); order + 1];
+            for ((s, [re, im]), weight) in self.at()[input].iter().zip(&own.values).zip(&own.weights) {
+                let mut take = |place: usize, value: Complex<f64>| {
+                    sums[place] += value.re;
+                    let product = -value * Complex::new(*re, *im) * *weight;
+                    beside[place].extend([product.re, product.im]);
+                };
+                for section in sections(order) {
+                    let values = basis(&poles[section.clone()], *s);
+                    section.zip(values).for_each(|(place, value)| take(place, value));
                 }
+                take(order, Complex::new(1.0, 0.0));
+            }
+            for (whole, mut column) in stacked.iter_mut().zip(beside) {
                 span.take_from(&mut column);
                 whole.append(&mut column);
             }
@@ -106,8 +110,7 @@ impl PolesObjective<'_> {
         let mut right = vec![0.0; stacked[0].len()];
         right.push(weight * count);
         let mut span = Span::default();
-        for (column, sum) in stacked.into_iter().zip(sums) {
-            let mut column = column;
+        for (mut column, sum) in stacked.into_iter().zip(sums) {
             column.push(weight * sum);
             span.add(column);
         }
@@ -145,14 +148,6 @@ pub(super) fn size(poles: &[f64], section: &Range<usize>) -> f64 {
     match &poles[section.clone()] {
         [_, a2] => a2.sqrt(),
         _ => 1.0,
-    }
-}
-
-/// What stands beside a coefficient of sigma: of a numerator, or 1 of d.
-fn of_place(poles: &[f64], order: usize, place: usize, s: Complex<f64>) -> Complex<f64> {
-    match sections(order).find(|section| section.contains(&place)) {
-        Some(section) => basis(&poles[section.clone()], s)[place - section.start],
-        None => Complex::new(1.0, 0.0),
     }
 }
 

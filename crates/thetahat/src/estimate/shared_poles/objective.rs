@@ -4,10 +4,11 @@ use std::ops::Range;
 
 use thetahat_core::nalgebra::Complex;
 use thetahat_numerics::optimize::Objective;
-use thetahat_numerics::regression::{Span, product, sum_of_squares};
+use thetahat_numerics::regression::{Span, sum_of_squares};
 
 use crate::Error;
 use crate::estimate::ResponsePoints;
+use crate::estimate::projection::{NormalEquations, Refusal, check_inside, draw_in};
 
 /// Poles lie between this fraction of the lowest frequency and so many times the highest.
 const WIDEST: f64 = 1e4;
@@ -17,15 +18,6 @@ const LEAST_DAMPING: f64 = 1e-7;
 /// Where the coefficients of each section stand: pairs of poles, and a real one last if their number is odd.
 pub(super) fn sections(order: usize) -> impl Iterator<Item = Range<usize>> + Clone {
     (0..order).step_by(2).map(move |first| first..order.min(first + 2))
-}
-
-/// Why poles have no cost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refusal {
-    /// They are outside of their limits.
-    Outside,
-    /// The errors are no numbers.
-    Overflow,
 }
 
 /// What stands beside each coefficient of a numerator: s/P and 1/P; 1/P of a single pole.
@@ -60,9 +52,9 @@ pub(super) struct PolesObjective<'a> {
     point: Vec<f64>,
     numerators: Vec<Vec<f64>>,
     spans: Vec<Span>,
-    residuals: Vec<Vec<f64>>,
-    matrix: Vec<f64>,
-    right: Vec<f64>,
+    /// Of all inputs, one after the other.
+    residuals: Vec<f64>,
+    equations: NormalEquations,
 }
 
 impl<'a> PolesObjective<'a> {
@@ -94,13 +86,12 @@ impl<'a> PolesObjective<'a> {
             at: points.iter().map(|own| own.frequencies.iter().map(|at| s(own, *at)).collect()).collect(),
             zero_at: held.filter(|_| !direct).map(|at| Complex::new(at, 0.0)),
             limits: [(low / WIDEST).ln(), (high.max(held.unwrap_or(0.0)) * WIDEST).ln()],
-            residuals: measured.clone(),
+            residuals: measured.concat(),
             measured,
             point: Vec::new(),
             numerators: Vec::new(),
             spans: Vec::new(),
-            matrix: Vec::new(),
-            right: Vec::new(),
+            equations: NormalEquations::default(),
         })
     }
 
@@ -139,7 +130,7 @@ impl<'a> PolesObjective<'a> {
     }
 
     pub(super) fn squares(&self) -> f64 {
-        self.residuals.iter().map(|own| sum_of_squares(own)).sum()
+        sum_of_squares(&self.residuals)
     }
 
     /// The values that were measured.
@@ -195,29 +186,32 @@ impl<'a> PolesObjective<'a> {
         })
     }
 
-    /// A column of an input: a function of s, times the weights.
-    pub(super) fn column(&self, input: usize, of: impl Fn(Complex<f64>) -> Complex<f64>) -> Vec<f64> {
-        let weighted = self.at[input].iter().zip(&self.points[input].weights).flat_map(|(s, weight)| {
-            let value = of(*s) * *weight;
-            [value.re, value.im]
-        });
-        weighted.collect()
+    /// Columns of an input: so many functions of s, times the weights, less what they are where a model without
+    /// feedthrough is zero.
+    fn columns(
+        &self,
+        input: usize,
+        count: usize,
+        of: impl Fn(Complex<f64>) -> [Complex<f64>; 2],
+    ) -> impl Iterator<Item = Vec<f64>> {
+        let apart = self.zero_at.map_or([Complex::new(0.0, 0.0); 2], &of);
+        let mut columns = vec![Vec::with_capacity(self.measured[input].len()); count];
+        for (s, weight) in self.at[input].iter().zip(&self.points[input].weights) {
+            for ((column, value), apart) in columns.iter_mut().zip(of(*s)).zip(apart) {
+                let value = (value - apart) * *weight;
+                column.extend([value.re, value.im]);
+            }
+        }
+        columns.into_iter()
     }
 
     /// The columns that numerators and d multiply.
     pub(super) fn linear_columns(&self, input: usize, poles: &[f64]) -> Vec<Vec<f64>> {
-        let mut columns = Vec::with_capacity(self.linear());
-        for section in sections(self.order) {
-            for place in 0..section.len() {
-                let value = |s: Complex<f64>| basis(&poles[section.clone()], s)[place];
-                let apart = self.zero_at.map_or(Complex::new(0.0, 0.0), value);
-                columns.push(self.column(input, |s| value(s) - apart));
-            }
-        }
-        if self.direct {
-            columns.push(self.column(input, |_| Complex::new(1.0, 0.0)));
-        }
-        columns
+        let each = sections(self.order).flat_map(|section| {
+            self.columns(input, section.len(), move |s| basis(&poles[section.clone()], s))
+        });
+        let direct = self.columns(input, usize::from(self.direct), |_| [Complex::new(1.0, 0.0); 2]);
+        each.chain(direct).collect()
     }
 
     /// How the response moves with the logarithm of each coefficient, N being held: of s^2 + a1 s + a2
@@ -226,20 +220,16 @@ impl<'a> PolesObjective<'a> {
     /// -N/P^2 a1 s,   -N/P^2 a2
     /// ```
     fn pole_columns(&self, input: usize, poles: &[f64]) -> Vec<Vec<f64>> {
-        let mut columns = Vec::with_capacity(self.order);
-        for section in sections(self.order) {
+        let of = |section: Range<usize>| {
             let (a, own) = (&poles[section.clone()], &self.numerators[input][section.clone()]);
-            for place in 0..section.len() {
-                let value = |s: Complex<f64>| {
-                    let beside = basis(a, s);
-                    let sum: Complex<f64> = beside.iter().zip(own).map(|(beside, own)| beside * *own).sum();
-                    -sum * beside[place] * a[place]
-                };
-                let apart = self.zero_at.map_or(Complex::new(0.0, 0.0), value);
-                columns.push(self.column(input, |s| value(s) - apart));
-            }
-        }
-        columns
+            self.columns(input, section.len(), move |s| {
+                let beside = basis(a, s);
+                let sum: Complex<f64> = beside.iter().zip(own).map(|(beside, own)| beside * *own).sum();
+                let mut a = a.iter();
+                beside.map(|beside| -sum * beside * *a.next().unwrap_or(&0.0))
+            })
+        };
+        sections(self.order).flat_map(of).collect()
     }
 
     /// psi of all parameters at all points, those of the other inputs being zero: the logarithms, then for each input
@@ -274,12 +264,9 @@ impl Objective for PolesObjective<'_> {
 
     /// O(N n^2) for N values.
     fn evaluate(&mut self, point: &[f64]) -> Result<f64, Refusal> {
-        let inside = |(value, [low, high]): (&f64, [f64; 2])| *value >= low && *value <= high;
-        if !point.iter().zip(self.bounds()).all(inside) {
-            return Err(Refusal::Outside);
-        }
+        check_inside(point, &self.bounds())?;
         let poles: Vec<f64> = point.iter().map(|value| value.exp()).collect();
-        let (mut cost, mut spans, mut numerators, mut residuals) = (0.0, Vec::new(), Vec::new(), Vec::new());
+        let (mut spans, mut numerators, mut residuals) = (Vec::new(), Vec::new(), Vec::new());
         for (input, measured) in self.measured.iter().enumerate() {
             let mut span = Span::default();
             for column in self.linear_columns(input, &poles) {
@@ -287,11 +274,11 @@ impl Objective for PolesObjective<'_> {
             }
             let mut left = measured.clone();
             let has = span.take_from(&mut left);
-            cost += sum_of_squares(&left);
             numerators.push(span.weights(&has));
-            residuals.push(left);
+            residuals.append(&mut left);
             spans.push(span);
         }
+        let cost = sum_of_squares(&residuals);
         if !cost.is_finite() {
             return Err(Refusal::Overflow);
         }
@@ -302,52 +289,31 @@ impl Objective for PolesObjective<'_> {
 
     fn linearize(&mut self) -> Result<f64, Refusal> {
         let poles = self.poles();
-        let size = self.order;
-        self.matrix = vec![0.0; size * size];
-        self.right = vec![0.0; size];
-        for (input, (span, left)) in self.spans.iter().zip(&self.residuals).enumerate() {
-            let mut columns = self.pole_columns(input, &poles);
-            for column in &mut columns {
-                span.take_from(column);
-            }
-            for (i, column) in columns.iter().enumerate() {
-                self.right[i] += product(column, left);
-                for (j, other) in columns.iter().enumerate() {
-                    self.matrix[i * size + j] += product(column, other);
-                }
+        let mut columns: Vec<Vec<f64>> = vec![Vec::with_capacity(self.residuals.len()); self.order];
+        for (input, span) in self.spans.iter().enumerate() {
+            for (column, mut own) in columns.iter_mut().zip(self.pole_columns(input, &poles)) {
+                span.take_from(&mut own);
+                column.append(&mut own);
             }
         }
-        for (place, [low, high]) in self.bounds().into_iter().enumerate() {
-            let (value, right) = (self.point[place], self.right[place]);
-            // It would leave through the bound that it stands on.
-            if value <= low && right < 0.0 || value >= high && right > 0.0 {
-                self.right[place] = 0.0;
-                for other in 0..size {
-                    self.matrix[place * size + other] = 0.0;
-                    self.matrix[other * size + place] = 0.0;
-                }
-            }
-        }
+        self.equations = NormalEquations::new(columns, &self.residuals, &self.point, &self.bounds());
         Ok(0.0)
     }
 
     fn matrix(&self) -> &[f64] {
-        &self.matrix
+        &self.equations.matrix
     }
 
     fn right(&self) -> &[f64] {
-        &self.right
+        &self.equations.right
     }
 
     fn is_outside(refusal: &Refusal) -> bool {
         *refusal == Refusal::Outside
     }
 
-    /// Moves coefficients onto the bound that they would cross.
     fn draw_in(&mut self, from: &[f64], trial: &mut [f64]) -> bool {
-        for (value, [low, high]) in trial.iter_mut().zip(self.bounds()) {
-            *value = value.clamp(low, high);
-        }
+        draw_in(trial, &self.bounds());
         from != trial
     }
 }

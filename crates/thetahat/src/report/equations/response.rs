@@ -6,7 +6,7 @@ use thetahat_numerics::optimize::Monitor;
 use super::{EquationsPlan, profiled, something_unknown, warnings};
 use crate::Error;
 use crate::estimate::equations::{EquationsPoint, EquationsResponse, ResponseLikelihood, largest_likelihood};
-use crate::estimate::{EquationsOutcome, Procedure};
+use crate::estimate::{EquationsOutcome, Procedure, coloured};
 use crate::model::{EquationsModel, GreyBox};
 use crate::report::response::{data, estimation, fitted, refuse, variance, warnings as of_response};
 use crate::report::schema::Report;
@@ -124,9 +124,7 @@ pub fn fit_equations_to_response(
     let slope = |index: usize| model.parameters()[index].scale.slope(found.z[index]);
     let size = found.z.len();
     let spread = DMatrix::from_fn(size, size, |i, j| spread[i * size + j] / slope(i) / slope(j));
-    let correlated = &found.covariance * spread * &found.covariance * factor;
-    // A covariance is symmetric to the bit.
-    let correlated = 0.5 * (&correlated + correlated.transpose());
+    let correlated = coloured(&found.covariance, factor, &spread);
     let covariance = correlated.row_iter().map(|row| row.iter().copied().collect());
     let noise = model.measurement_variances_at_start();
     let own = EquationsModel::new(&model, &found.values, covariance.collect(), &noise);

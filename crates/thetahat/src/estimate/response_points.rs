@@ -1,5 +1,7 @@
 //! What a measured frequency response says of one input.
 
+use thetahat_core::nalgebra::DMatrix;
+
 use crate::respond::Correlation;
 use crate::respond::process::Points;
 
@@ -44,8 +46,25 @@ impl ResponsePoints {
         slopes.get(slopes.len() / 2).copied().filter(|slope| *slope > 0.0)
     }
 
+    /// The sum of rho psi_k psi_l' over the points of each input, of columns of psi at the points of all inputs, one
+    /// after the other ([`Correlation::spread`]).
+    pub(super) fn spread(points: &[Self], psi: &[&Vec<f64>]) -> DMatrix<f64> {
+        let size = psi.len();
+        let mut sum = DMatrix::zeros(size, size);
+        let mut first = 0;
+        for own in points {
+            let rows = (0..own.frequencies.len()).map(|row| first + 2 * row);
+            let slopes: Vec<[f64; 2]> =
+                rows.flat_map(|row| psi.iter().map(move |column| [column[row], column[row + 1]])).collect();
+            let spread = own.correlation.spread(&own.frequencies, &slopes, size);
+            sum += DMatrix::from_row_slice(size, size, &spread);
+            first += 2 * own.frequencies.len();
+        }
+        sum
+    }
+
     /// Real and imaginary parts, times their weights.
-    pub(crate) fn measured(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn measured(&self) -> impl Iterator<Item = f64> {
         self.values.iter().zip(&self.weights).flat_map(|(value, weight)| value.map(|part| part * weight))
     }
 }

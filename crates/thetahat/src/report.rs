@@ -5,6 +5,7 @@
 //!   an [`EquationsPlan`], [`fit_process`] for a process in continuous time with a [`ProcessPlan`],
 //!   [`fit_process_to_response`] for one of a measured frequency response, [`fit_state_space`]
 //!   ([`fit_state_space_monitored`]) for a model with any number of outputs with a [`StateSpacePlan`],
+//!   [`fit_states_to_response`] for one of a measured frequency response,
 //!   [`fit_nonlinear_arx`] for a nonlinear ARX model with a [`NonlinearArxPlan`] ([`InputLags`], [`MapPlan`],
 //!   [`Centres`]), [`fit_arima`] for a seasonal ARIMA model with an [`ArimaPlan`].
 //! - [`NormalEquations`] are made from pieces of the data, add up, and are solved for one model: for logs larger than

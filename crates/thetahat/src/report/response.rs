@@ -128,8 +128,8 @@ pub(super) fn data(response: &MeasuredResponse, channels: impl Iterator<Item = S
     }
 }
 
-/// What a reader should know of the points, and of errors whose mean square is `mse`, in variances of the points if these
-/// are known.
+/// What a reader should know of the points, and of errors whose mean square is `mse`, in variances of the points if
+/// these are known.
 pub(super) fn warnings(response: &MeasuredResponse, mse: f64, known: bool) -> Vec<String> {
     let mut warnings = Vec::new();
     if response.bands.honest == Some(false) {

@@ -1,8 +1,8 @@
 //! How parameters were found, and how well they are determined.
 
 use crate::estimate::{
-    ConvexOutcome, Coupling, Initial, Norm, Procedure, ProcessOutcome, RefinementOutcome, RobustOutcome,
-    Solver, SubspaceOutcome, VectorArxOutcome,
+    ConvexOutcome, Coupling, Initial, Norm, OrderScore, Procedure, ProcessOutcome, RefinementOutcome,
+    RobustOutcome, Solver, SubspaceOutcome, VectorArxOutcome,
 };
 use thetahat_numerics::optimize::Stopped;
 
@@ -134,16 +134,10 @@ pub(super) fn procedure(on: &mut Sections, report: &Report) {
             on.line(points(estimation, found.relative, found.iterations, found.stopped));
         }
         Procedure::SharedPoles(found) => {
-            let feedthrough = match (found.feedthrough, found.feedthrough_given) {
-                (true, true) => "inputs act at once, as asked for",
-                (false, true) => "no input acts at once, as asked for",
-                (true, false) => "inputs act at once, which lowers MDL",
-                (false, false) => "no input acts at once, which lowers MDL",
-            };
             on.line(points(estimation, found.relative, found.iterations, found.stopped));
-            let count = found.orders.len();
-            let chosen = if count > 1 { format!("; the least MDL of {count} orders") } else { String::new() };
-            on.line(format!("vector fitting and a search; {feedthrough}{chosen}"));
+            let feedthrough = feedthrough(found.feedthrough, found.feedthrough_given);
+            on.line(format!("vector fitting and a search; {feedthrough}"));
+            order_scores(on, &found.orders);
         }
         Procedure::Subspace(found) => {
             on.line(subspace(found));
@@ -233,6 +227,32 @@ fn free_run(on: &mut Sections, outcome: &ProcessOutcome) {
     });
 }
 
+/// What an order was chosen among.
+fn order_scores(on: &mut Sections, scores: &[OrderScore]) {
+    let least = scores.iter().filter_map(|score| score.mdl).fold(f64::INFINITY, f64::min);
+    let mut table = columns("Orders", ["", "order", "MDL above the least"]);
+    for score in scores {
+        table.row([
+            word(if score.mdl == Some(least) { "*" } else { "" }),
+            word(score.order),
+            score.mdl.map_or(word(""), |mdl| figure(mdl - least, |value| fixed(value, 1))),
+        ]);
+    }
+    if !scores.is_empty() {
+        on.table(table);
+    }
+}
+
+/// Whether inputs act at once, and who said it.
+fn feedthrough(is_there: bool, given: bool) -> &'static str {
+    match (is_there, given) {
+        (true, true) => "inputs act at once, as asked for",
+        (false, true) => "no input acts at once, as asked for",
+        (true, false) => "inputs act at once, which lowers MDL",
+        (false, false) => "no input acts at once",
+    }
+}
+
 /// How points of a frequency response were fitted to.
 fn points(estimation: &Estimation, is_relative: bool, iterations: usize, why: Stopped) -> String {
     let root = estimation.mse.sqrt();
@@ -251,12 +271,7 @@ fn points(estimation: &Estimation, is_relative: bool, iterations: usize, why: St
 
 /// How states were found.
 fn subspace(outcome: &SubspaceOutcome) -> String {
-    let feedthrough = match (outcome.feedthrough, outcome.feedthrough_given) {
-        (true, true) => "inputs act at once, as asked for",
-        (false, true) => "no input acts at once, as asked for",
-        (true, false) => "inputs act at once, which lowers MDL",
-        (false, false) => "no input acts at once",
-    };
+    let feedthrough = feedthrough(outcome.feedthrough, outcome.feedthrough_given);
     let method = outcome.weighting.to_string().to_uppercase();
     let levels = if outcome.constant { "; levels of the outputs estimated with the matrices" } else { "" };
     format!("subspace method {method}, a past of {} samples; {feedthrough}{levels}", outcome.past)

@@ -3,7 +3,7 @@
 use nalgebra::{OMatrix, OVector};
 
 use crate::around::around_kalman_filter;
-use crate::error::{check_entries, check_finite};
+use crate::error::{check_entries, check_finite, check_length};
 use crate::kalman::prediction_error;
 use crate::state_space::transpose;
 use crate::triangle::{column, column_mut};
@@ -180,20 +180,19 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         check_entries("next state", next.as_slice(), state.len())?;
         noise.check("transition noise", state.len())?;
         let points = At(transition, input);
-        let (Seen { mean, rows, mut noise }, mut bends) = self.seen(next, noise, "next state", &points)?;
-        let (state_matrix, mut noise_matrix) = (transpose(&rows), noise.matrix());
-        let (n, weight) = (mean.len(), self.weight());
+        let (Seen { mean, matrix, mut noise }, mut bends) = self.seen(next, noise, "next state", &points)?;
+        let (n, weight, mut noise_matrix) = (mean.len(), self.weight(), noise.matrix());
         for index in 0..n {
             let bend = column(bends.as_slice(), n, index);
             for (k, &entry) in bend.iter().enumerate() {
                 add_multiple(column_mut(noise_matrix.as_mut_slice(), n, k), weight * entry, bend);
             }
         }
-        self.linear.propagate(&points, mean, &state_matrix, &noise_matrix, || {
+        self.linear.propagate(&points, mean, &matrix, &noise_matrix, || {
             add_bends(&mut noise, &mut bends, weight);
             &noise
         })?;
-        Ok(state_matrix)
+        Ok(matrix)
     }
 
     /// The measurement that is expected now, ȳ, and the covariance S of its innovation.
@@ -207,8 +206,8 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
     where
         N: Dimension<M>,
     {
-        let Seen { mean, rows, noise } = self.observed(observation, input)?;
-        let covariance = self.linear.covariance().transformed(&transpose(&rows))?.plus(&noise)?;
+        let Seen { mean, matrix, noise } = self.observed(observation, input)?;
+        let covariance = self.linear.covariance().transformed(&matrix)?.plus(&noise)?;
         Ok((mean, covariance))
     }
 
@@ -246,12 +245,12 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
     where
         N: Dimension<M>,
     {
-        let Seen { mean, rows, noise } = self.observed(observation, input)?;
+        let Seen { mean, matrix, noise } = self.observed(observation, input)?;
         let error = prediction_error(measurement, mean)?;
-        self.linear.absorb(rows, error, &noise, |h, v, s, e| record(0, h, v, s, e))
+        self.linear.absorb(transpose(&matrix), error, &noise, |h, v, s, e| record(0, h, v, s, e))
     }
 
-    /// The observation as the points see it.
+    /// The observation as the points see it, its bends among its noise.
     #[inline(always)]
     fn observed<M: Dimension + Dimension<N>, U: Dimension>(
         &self,
@@ -290,8 +289,8 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
         let (size, n, outputs) = (factor.size(), state.len(), centre.len());
         let (half, finest) = (nalgebra::convert::<f64, T>(0.5), T::SQRT_EPSILON);
         let mean_weight = T::one() / (self.spread * self.spread);
-        let mut rows = size.rows_by(noise.size(), T::zero());
-        let mut bends = noise.size().rows_by(size, T::zero());
+        let mut matrix = noise.size().rows_by(size, T::zero());
+        let mut bends = matrix.clone();
         let mut mean = centre.clone();
         for (index, x) in state.as_slice().iter().enumerate() {
             let deviation = ud::variance(factor.as_slice(), n, index).sqrt();
@@ -301,42 +300,43 @@ impl<T: Real, N: Dimension> UnscentedKalmanFilter<T, N> {
             }
             let mut direction = size.vector(T::zero());
             ud::unit_column(factor.as_slice(), direction.as_mut_slice(), index);
-            let at = |step: T| {
+            let step = self.spread * reach;
+            let value = |step: T| {
                 let mut point = state.clone();
                 add_multiple(point.as_mut_slice(), step, direction.as_slice());
-                let value = function.value(&point);
-                check_entries(argument, value.as_slice(), outputs).map(|()| value)
+                function.value(&point)
             };
-            let (ahead, behind) = (at(self.spread * reach)?, at(-self.spread * reach)?);
-            let slope = half / (self.spread * reach);
+            // What is not finite shows in a slope or a bend.
+            let (ahead, behind) = (value(step), value(-step));
+            check_length(argument, outputs, ahead.len())?;
+            check_length(argument, outputs, behind.len())?;
+            let scale = half / step;
             let share = if reach > deviation { deviation / reach } else { T::one() };
+            let slope = column_mut(matrix.as_mut_slice(), outputs, index);
             let bend = column_mut(bends.as_mut_slice(), outputs, index);
             let values = ahead.as_slice().iter().zip(behind.as_slice()).zip(centre.as_slice());
-            for (output, ((&ahead, &behind), &centre)) in values.enumerate() {
+            for ((slope, bend), ((&ahead, &behind), &centre)) in slope.iter_mut().zip(&mut *bend).zip(values)
+            {
                 // Differences first: where these are small beside the values, their sum keeps its digits.
-                if let Some(entry) = column_mut(rows.as_mut_slice(), n, output).get_mut(index) {
-                    *entry = (ahead - behind) * slope;
-                }
-                if let Some(bend) = bend.get_mut(output) {
-                    *bend = ((ahead - centre) + (behind - centre)) * half * share * share;
-                }
+                *slope = (ahead - behind) * scale;
+                *bend = ((ahead - centre) + (behind - centre)) * half * share * share;
             }
             add_multiple(mean.as_mut_slice(), mean_weight, bend);
         }
-        // So far each row h' is h'U: a column of U' h. U' is solved from above.
-        for output in 0..outputs {
-            let row = column_mut(rows.as_mut_slice(), n, output);
-            for index in 1..n {
-                let (known, rest) = row.split_at_mut_checked(index).unwrap_or_default();
-                if let Some(entry) = rest.first_mut() {
-                    *entry -= ud::dot(known, column(factor.as_slice(), n, index));
-                }
+        // So far it is G U, from which G is solved from the left.
+        for index in 1..n {
+            let (known, rest) =
+                matrix.as_mut_slice().split_at_mut_checked(index * outputs).unwrap_or_default();
+            let target = column_mut(rest, outputs, 0);
+            for i in 0..index {
+                let entry = ud::entry(factor.as_slice(), n, i, index);
+                add_multiple(target, -entry, column(known, outputs, i));
             }
         }
         check_finite(argument, mean.as_slice())?;
-        check_finite(argument, rows.as_slice())?;
+        check_finite(argument, matrix.as_slice())?;
         check_finite(argument, bends.as_slice())?;
-        Ok((Seen { mean, rows, noise }, bends))
+        Ok((Seen { mean, matrix, noise }, bends))
     }
 
     /// (c² - 1)/c⁴, the weight of the bends in a covariance.
@@ -379,11 +379,11 @@ impl<
 }
 
 /// A function as the points see it: linear, with noise.
-struct Seen<T: Real, N: Dimension<R>, R: Dimension> {
+struct Seen<T: Real, N: Dimension, R: Dimension + Dimension<N>> {
     /// ḡ.
     mean: OVector<T, R>,
-    /// The rows of G, as columns.
-    rows: OMatrix<T, N, R>,
+    /// G.
+    matrix: OMatrix<T, R, N>,
     /// The noise that is added.
     noise: Covariance<T, R>,
 }

@@ -175,6 +175,11 @@ fn what_is_no_frequency_response_is_refused_and_nothing_written() {
         ("f,re,im\n1,2,3\n2,inf,3\n2,1,1\n", "inf"),
         ("f,re,im\n1,two,3\n2,1,1\n", "two"),
         ("t,u,y\n1,2,3\n2,1,1\n", "no frequency response is known by the columns t, u, y"),
+        (
+            "frequency,magnitude,magnitude_standard_error,phase\n1,2,3,4\n2,1,1,1\n",
+            "a table that thetahat wrote",
+        ),
+        ("frequency [rad/s]  magnitude  standard error\n1  2  3\n4  5  6\n", "a table that thetahat wrote"),
         ("{\"schema\": \"thetahat.response/1\"", "z.csv"),
     ] {
         folder.write("z.csv", table);

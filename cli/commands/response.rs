@@ -93,6 +93,13 @@ pub(super) fn read(
     let file = path.display().to_string();
     let bad = |message: String| Failure::data(format!("{file}: {message}"));
     let reader = Reader::open(path, format.unwrap_or(&Options::default()))?;
+    let is_there = |name: &str| reader.names().iter().any(|own| own == name);
+    let is_own = is_there("magnitude_standard_error") || is_there("frequency [rad/s]");
+    if is_own && columns.is_empty() {
+        return Err(bad("it is a table that thetahat wrote, in rad/s and without the sample time of the log; \
+             fit to the document of spectrum --format json, or say with --columns rad/s=frequency that inputs were sines"
+            .to_owned()));
+    }
     let roles = roles(reader.names(), columns).map_err(bad)?;
     let selection =
         Selection { columns: roles.iter().map(|(_, place)| *place).collect(), ..Selection::default() };

@@ -486,8 +486,9 @@ def test_errors_of_functions_name_these_and_their_lines() -> None:
         with pytest.raises(kind, match=words) as caught:
             made(next=function)
         assert "next, which is" in str(caught.value)
-    with pytest.raises(ValueError, match=r"^parameters\['area'\]: the unknown parameter 'area' needs 'sd'"):
-        made(parameters={"area": {"start": 1.0, "unknown": True}})
+    with pytest.raises(ValueError, match=r"^parameters\['area'\]: the unknown parameter 'area' starts at 0 and needs 'sd'"):
+        made(parameters={"area": {"start": 0.0, "unknown": True}})
+    assert made(parameters={"area": {"start": -2.0, "unknown": True}})
     with pytest.raises(ValueError, match=r"^states\['level'\]: 'level' is there twice|^parameters\['level'\]: the name 'level'"):
         made(parameters={"level": 1.0, "area": 1.0})
     with pytest.raises(AttributeError, match="the model has no parameters"):

@@ -79,7 +79,7 @@ fn free_covariance(
     let open = named(names, |index| open[index]);
     if !open.is_empty() {
         let message = format!(
-            "the log cannot tell {} apart: changes of them together leave the predictions as they are; take one of them \
+            "the data cannot tell {} apart: changes of them together leave the predictions as they are; take one of them \
              as known, or measure more",
             listed(&open)
         );

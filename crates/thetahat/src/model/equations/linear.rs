@@ -1,16 +1,17 @@
 //! What linear equations are to their inputs: transfer functions.
 //!
 //! ```text
-//! x(k+1) = F x + G u + c,   y = H x + D u + d
-//! y = (H (q I - F)^-1 G + D) u + constants = (B(q)/A(q)) u + constants
+//! x(k+1) = A x + sum_e B_e v_e + E_e (q - 1) v_e + c,   y = C x + sum_e D_e v_e + d
 //! ```
 //!
-//! A is the characteristic polynomial of F, by Faddeev and Le Verrier's recursion (Gantmacher, The Theory of Matrices,
-//! 1959, chapter IV, section 5), which gives the adjoint of q I - F with it:
+//! where e are the ways by which inputs come in, each with its delay of m - f samples, v_e = q^-m (1 - f + f q) u
+//! ([`Linearized`]; E_e is of inputs that go in lines). So y = sum_e N_e(q)/A(q) v_e + constants, where A(q) is the
+//! characteristic polynomial of A, by Faddeev and Le Verrier's recursion (Gantmacher, The Theory of Matrices, 1959,
+//! chapter IV, section 5), which gives the adjoint of q I - A with it:
 //!
 //! ```text
-//! M_1 = I,   a_k = -tr(F M_k)/k,   M_(k+1) = F M_k + a_k I
-//! A = 1 + sum a_k q^-k,   B = D A + sum (H M_k G) q^-k
+//! M_1 = I,   a_k = -tr(A M_k)/k,   M_(k+1) = A M_k + a_k I,   A(q) = 1 + sum a_k q^-k
+//! N_e = D_e A(q) + sum_k C M_k (B_e - E_e) q^-k + C M_k E_e q^-(k-1)
 //! ```
 //!
 //! In dual numbers the same operations give the derivatives by the parameters, and with them the covariance of A and B.
@@ -18,14 +19,14 @@
 
 use thetahat_core::{Dual, Number};
 
-use super::{Drive, EquationsModel, GreyBox, Work};
+use super::{EquationsModel, GreyBox, Linearized, Work};
 use crate::Error;
-use crate::model::{Orders, PolynomialModel, fitted::propagated};
+use crate::model::{LARGEST, Orders, PolynomialModel, fitted::propagated};
 
 /// Derivatives that are computed together.
 const LANE: usize = 4;
 
-/// A, and B of each input, of one output: a_1 … a_n, then b_0 … b_n of each.
+/// A, and B of each input, of one output: a_1 … a_n, then b_0 … b_(n + l) of each, the last of which is l samples late.
 type Coefficients<S> = Vec<S>;
 
 impl EquationsModel {
@@ -45,16 +46,18 @@ impl EquationsModel {
                 ),
             ));
         }
-        if model.longest_delay().is_some() || !model.linear_holds().is_empty() {
+        let lines = model.linear_holds().iter().zip(model.delays()).zip(&self.inputs);
+        if let Some((_, input)) = lines.into_iter().find(|((line, delay), _)| **line && delay.is_some()) {
             return Err(Error::argument(
                 "model",
                 format!(
-                    "{what} is of inputs that are held from row to row and act without delay, and these equations say otherwise of an \
-                     input: they predict, simulate, validate, compare and filter"
+                    "{what} is of inputs that go in lines or act later, and '{}' does both: the equations predict, simulate, \
+                     validate, compare and filter",
+                    input.name
                 ),
             ));
         }
-        let plain = coefficients(&model, &z);
+        let (late, plain) = coefficients(&model, &z)?;
         let size = z.len();
         // By the parameters in their own units.
         let mut slopes = vec![vec![0.0; size]; plain.iter().map(Vec::len).sum()];
@@ -62,7 +65,7 @@ impl EquationsModel {
             let mut variables: Vec<Dual<f64, LANE>> = z.iter().map(|z| Dual::from(*z)).collect();
             let own = first..size.min(first + LANE);
             own.clone().enumerate().for_each(|(place, index)| variables[index].derivatives[place] = 1.0);
-            for (found, slopes) in coefficients(&model, &variables).iter().flatten().zip(&mut slopes) {
+            for (found, slopes) in coefficients(&model, &variables)?.1.iter().flatten().zip(&mut slopes) {
                 for (place, index) in own.clone().enumerate() {
                     let scale = model.parameters()[index].scale.slope(z[index]);
                     slopes[index] = found.derivatives[place] / scale;
@@ -73,7 +76,7 @@ impl EquationsModel {
         let outputs = plain.into_iter().zip(&self.outputs).enumerate();
         let each = outputs.map(|(index, (values, output))| {
             let slopes: Vec<Vec<f64>> = slopes.by_ref().take(values.len()).collect();
-            let (values, slopes, orders) = self.arranged(values, slopes)?;
+            let (values, slopes, orders) = self.arranged(&late, values, slopes)?;
             let covariance = propagated(&slopes, self.covariance.as_deref());
             let variance = self.noise_covariance[index][index];
             let time = self.sample_time;
@@ -84,53 +87,44 @@ impl EquationsModel {
         each.collect()
     }
 
-    /// The same without a b_0 that is zero whatever the parameters, and the orders that are left.
+    /// The same without the first b that are zero whatever the parameters, and the orders that are left.
     #[expect(clippy::type_complexity, reason = "values and slopes as they came, and orders")]
     fn arranged(
         &self,
+        late: &[usize],
         values: Vec<f64>,
         slopes: Vec<Vec<f64>>,
     ) -> Result<(Vec<f64>, Vec<Vec<f64>>, Orders), Error> {
-        let (n, inputs) = (self.states.len(), self.inputs.len());
-        let at_once: Vec<usize> = (0..inputs).map(|input| n + input * (n + 1)).collect();
+        let n = self.states.len();
         let is_nothing =
-            |place: &usize| values[*place] == 0.0 && slopes[*place].iter().all(|slope| *slope == 0.0);
-        let out: Vec<usize> = at_once.iter().filter(|place| is_nothing(place)).copied().collect();
-        let delays: Vec<usize> = at_once.iter().map(|place| usize::from(out.contains(place))).collect();
-        let lengths: Vec<usize> = delays.iter().map(|delay| n + 1 - delay).collect();
+            |place: usize| values[place] == 0.0 && slopes[place].iter().all(|slope| *slope == 0.0);
+        let (mut kept, mut lengths, mut delays) = ((0..n).collect::<Vec<_>>(), Vec::new(), Vec::new());
+        let mut end = n;
+        for late in late {
+            let (first, last) = (end, end + n + late);
+            end = last + 1;
+            let begin = (first..last).find(|place| !is_nothing(*place)).unwrap_or(last);
+            kept.extend(begin..end);
+            lengths.push(end - begin);
+            delays.push(begin - first);
+        }
         let orders = Orders::arx(n, &lengths, &delays)?;
-        let kept = |place: &usize| !out.contains(place);
-        let places: Vec<usize> = (0..values.len()).filter(kept).collect();
-        let slopes = places.iter().map(|&place| slopes[place].clone()).collect();
-        Ok((places.iter().map(|&place| values[place]).collect(), slopes, orders))
+        let slopes = kept.iter().map(|&place| slopes[place].clone()).collect();
+        Ok((kept.iter().map(|&place| values[place]).collect(), slopes, orders))
     }
 }
 
-/// Those of each output. O(n^4 + n^3 (m + inputs)).
-fn coefficients<S: Number<f64>>(model: &GreyBox, z: &[S]) -> Vec<Coefficients<S>> {
+/// By how many samples the last of each input is late, and the coefficients of each output. O(n^4 + n^3 m e) for e ways.
+///
+/// # Errors
+/// [`Error::Argument`] for a delay of more samples than an order may have.
+fn coefficients<S: Number<f64>>(
+    model: &GreyBox,
+    z: &[S],
+) -> Result<(Vec<usize>, Vec<Coefficients<S>>), Error> {
     let (n, m, inputs) = (model.states().len(), model.outputs().len(), model.inputs().len());
-    let zero: S = 0.0.into();
-    let mut work = Work::new();
-    let origin = vec![zero; n];
-    // F and H, column after column, and what u does beside what stands without it.
-    let mut at = |u: &[f64]| {
-        let (mut next, mut f) = (vec![zero; n], vec![zero; n * n]);
-        let (mut y, mut h) = (vec![zero; m], vec![zero; m * n]);
-        let u = Drive::held(u);
-        model.advance(&origin, z, u, 0.0, model.sample_time(), &mut next, &mut f, &mut work);
-        model.observe(&origin, z, u, 0.0, &mut y, &mut h, &mut work);
-        (next, f, y, h)
-    };
-    let mut u = vec![0.0; inputs];
-    let (next, f, y, h) = at(&u);
-    let (mut g, mut d) = (Vec::new(), Vec::new());
-    for input in 0..inputs {
-        u[input] = 1.0;
-        let (moved, _, seen, _) = at(&u);
-        u[input] = 0.0;
-        g.push(moved.iter().zip(&next).map(|(&moved, &next)| moved - next).collect::<Vec<S>>());
-        d.push(seen.iter().zip(&y).map(|(&seen, &y)| seen - y).collect::<Vec<S>>());
-    }
+    let (zero, time): (S, f64) = (0.0.into(), model.sample_time());
+    let Linearized { a: matrix, c, entrances } = model.linearized(z, Some(time), &mut Work::new());
     let times = |left: &[S], right: &[S]| -> Vec<S> {
         let mut product = vec![zero; n * n];
         for column in 0..n {
@@ -142,36 +136,67 @@ fn coefficients<S: Number<f64>>(model: &GreyBox, z: &[S]) -> Vec<Coefficients<S>
         }
         product
     };
-    let mut found: Vec<Coefficients<S>> = vec![vec![zero; n + inputs * (n + 1)]; m];
-    let mut adjoint = vec![zero; n * n];
-    (0..n).for_each(|index| adjoint[index * n + index] = 1.0.into());
+    let diagonal = |matrix: &mut [S], value: S| {
+        matrix.iter_mut().step_by(n + 1).for_each(|entry| *entry += value);
+    };
+    let mut adjoints = vec![vec![zero; n * n]];
+    diagonal(&mut adjoints[0], 1.0.into());
+    let mut polynomial: Vec<S> = Vec::with_capacity(n);
     for k in 1..=n {
-        for (output, found) in found.iter_mut().enumerate() {
-            for (input, g) in g.iter().enumerate() {
-                let mut sum = zero;
-                for column in 0..n {
-                    for row in 0..n {
-                        sum += h[row * m + output] * adjoint[column * n + row] * g[column];
-                    }
-                }
-                found[n + input * (n + 1) + k] = sum;
+        let mut next = times(&matrix, &adjoints[k - 1]);
+        let trace = next.iter().step_by(n + 1).fold(zero, |sum, &entry| sum + entry);
+        polynomial.push(-(trace * (1.0 / k as f64)));
+        diagonal(&mut next, polynomial[k - 1]);
+        adjoints.push(next);
+    }
+    // Row `output` of C, times M_k, times a column.
+    let seen = |output: usize, k: usize, column: &[S]| -> S {
+        let mut sum = zero;
+        for (adjoint, &weight) in adjoints[k - 1].chunks_exact(n).zip(column) {
+            for (row, &entry) in adjoint.iter().enumerate() {
+                sum += c[row * m + output] * entry * weight;
             }
         }
-        adjoint = times(&f, &adjoint);
-        let trace = (0..n).fold(zero, |sum, index| sum + adjoint[index * n + index]);
-        let a = -(trace * (1.0 / k as f64));
-        (0..n).for_each(|index| adjoint[index * n + index] += a);
-        found.iter_mut().for_each(|found| found[k - 1] = a);
+        sum
+    };
+    let mut late = vec![0; inputs];
+    for own in &entrances {
+        late[own.input] = late[own.input].max(own.late(time).0);
     }
-    for (output, found) in found.iter_mut().enumerate() {
-        for (input, d) in d.iter().enumerate() {
-            let first = n + input * (n + 1);
-            found[first] = d[output];
+    if let Some(place) = late.iter().position(|&late| late > LARGEST) {
+        let (name, samples) = (&model.inputs()[place], late[place]);
+        return Err(Error::argument(
+            "model",
+            format!("'{name}' acts {samples} samples later, and {LARGEST} is the most of polynomials"),
+        ));
+    }
+    let firsts: Vec<usize> =
+        (0..inputs).map(|input| n + late[..input].iter().map(|late| n + 1 + late).sum::<usize>()).collect();
+    let length = n + late.iter().map(|late| n + 1 + late).sum::<usize>();
+    let found = (0..m).map(|output| {
+        let mut found = vec![zero; length];
+        found[..n].copy_from_slice(&polynomial);
+        for own in &entrances {
+            let mut numerator = vec![own.d[output]];
+            numerator.extend(polynomial.iter().map(|&a| own.d[output] * a));
             for k in 1..=n {
-                let a = found[k - 1];
-                found[first + k] += d[output] * a;
+                numerator[k] += seen(output, k, &own.b);
+                if !own.bend.is_empty() {
+                    let bent = seen(output, k, &own.bend);
+                    numerator[k] += -bent;
+                    numerator[k - 1] += bent;
+                }
+            }
+            let (samples, part) = own.late(time);
+            for (place, &entry) in (firsts[own.input] + samples..).zip(&numerator) {
+                found[place] += entry * (-part + 1.0);
+                if samples > 0 {
+                    found[place - 1] += entry * part;
+                }
             }
         }
-    }
-    found
+        found
+    });
+    let found = found.collect();
+    Ok((late, found))
 }

@@ -72,6 +72,14 @@ pub(crate) struct Entrance<S> {
     pub(crate) delay: S,
 }
 
+impl<S: Number<f64>> Entrance<S> {
+    /// The delay in samples of so many seconds, m - f: m, which is whole, and f, which is below 1.
+    pub(crate) fn late(&self, seconds: f64) -> (usize, S) {
+        let samples = (self.delay.value() / seconds).ceil();
+        (samples as usize, -(self.delay * (1.0 / seconds)) + samples)
+    }
+}
+
 impl<S: Number<f64>> Linearized<S> {
     /// The same in samples of so many seconds, of inputs that are held or go `in_lines`.
     fn sampled(self, seconds: f64, in_lines: &[bool]) -> Self {

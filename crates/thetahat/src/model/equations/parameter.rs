@@ -74,11 +74,12 @@ fn parameter(entry: &Entry<'_>, known: &[(String, f64)]) -> Result<Given, Error>
     section.allow(&["start", "sd", "unknown", "min", "max", "walk", "unit"])?;
     let unit = section.text("unit")?.map(str::to_owned);
     let walk = section.get("walk").map(|walk| walk.non_negative()).transpose()?.unwrap_or(0.0);
-    let given = limited(&section, entry.key, known, section.number("min")?, |_| {
-        Err(section.error(format!(
-            "the unknown parameter {} needs 'sd', how far off its start may be",
+    let given = limited(&section, entry.key, known, section.number("min")?, |start| match start.abs() {
+        0.0 => Err(section.error(format!(
+            "the unknown parameter {} starts at 0 and needs 'sd', how far off that may be",
             quoted(entry.key)
-        )))
+        ))),
+        spread => Ok(spread),
     })?;
     Ok(match given {
         Given::Unknown(unknown) => Given::Unknown(Unknown { walk, unit, ..unknown }),

@@ -57,9 +57,8 @@ pub(crate) fn response<S: Number<f64>>(
 /// What a delay makes of a sine, or of its samples.
 fn late<S: Number<f64>>(own: &Entrance<S>, frequency: f64, held: Option<f64>) -> Complex<S> {
     let Some(time) = held else { return Complex::turned(-(own.delay * frequency)) };
-    let samples = (own.delay.value() / time).ceil();
-    let part = -(own.delay * (1.0 / time)) + samples;
-    let whole = Complex::turned(S::from(-samples * frequency * time));
+    let (samples, part) = own.late(time);
+    let whole = Complex::turned(S::from(-(samples as f64) * frequency * time));
     let (one, z) = (Complex::real(-part + 1.0), Complex::turned(S::from(frequency * time)));
     whole.times(one.plus(Complex::real(part).times(z)))
 }

@@ -1,5 +1,7 @@
 //! Transfer functions of linear equations.
 
+use thetahat_core::nalgebra::Complex;
+
 use crate::model::equations::{Drive, Work};
 use crate::model::{EquationsModel, GreyBox};
 
@@ -102,15 +104,63 @@ fn their_covariance_is_that_of_the_parameters() {
     }
 }
 
+/// Of [`TEXT`], with `u` some time ago as well, or in lines.
+fn changed(from: &str, to: &str) -> Result<EquationsModel, crate::Error> {
+    assert!(TEXT.contains(from));
+    let model = GreyBox::from_toml(&TEXT.replace(from, to))?;
+    let noise = model.measurement_variances_at_start();
+    let covariance = vec![vec![0.04, 0.01], vec![0.01, 0.09]];
+    Ok(EquationsModel::new(&model, &[1.7, -0.4], covariance, &noise))
+}
+
+#[test]
+fn inputs_that_act_later_or_go_in_lines_have_polynomials_of_their_response() {
+    for (from, to) in [
+        ("+ u'", "+ u + 0.7 * u(t - 0.23 * k)'"),
+        ("+ u'", "+ u(t - 0.3)'"),
+        ("m * v'", "m * v(t - 0.25)'"),
+        ("v = 'v'", "v = { channel = 'v', hold = 'linear' }"),
+    ] {
+        let found = changed(from, to).unwrap();
+        let (model, z) = found.with_variables().unwrap();
+        let system = model.linearized(&z, Some(0.1), &mut Work::new());
+        for (output, linear) in found.linear("this test").unwrap().iter().enumerate() {
+            for omega in [0.0, 0.4, 3.0, 30.0] {
+                let expected = crate::respond::equations::response(&system, output, 2, omega, Some(0.1));
+                for (input, expected) in expected.iter().enumerate() {
+                    let z = Complex::new(0.0, -omega * 0.1).exp();
+                    let sum = |coefficients: &[f64]| {
+                        let terms = coefficients.iter().enumerate();
+                        terms.map(|(lag, &value)| z.powi(lag as i32) * value).sum::<Complex<f64>>()
+                    };
+                    let own = sum(&linear.b[input]) / sum(&linear.a);
+                    let distance = (own - Complex::new(expected.re, expected.im)).norm();
+                    assert!(distance < 1e-12, "{to} {output} {input} {omega}: {distance:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn delays_that_polynomials_do_not_have_are_refused() {
+    let refused = |from: &str, to: &str, words: &str| {
+        let message = changed(from, to).unwrap().linear("this test").unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    };
+    refused("+ u'", "+ u(t - 100.5)'", "'u' acts 1005 samples later, and 1000 is the most of polynomials");
+    let text =
+        TEXT.replace("+ u'", "+ u(t - 0.2)'").replace("u = 'u'", "u = { channel = 'u', hold = 'linear' }");
+    let model = GreyBox::from_toml(&text).unwrap();
+    let noise = model.measurement_variances_at_start();
+    let found = EquationsModel::new(&model, &[1.7, -0.4], vec![vec![0.1, 0.0], vec![0.0, 0.1]], &noise);
+    let message = found.linear("this test").unwrap_err().to_string();
+    assert!(message.contains("go in lines or act later, and 'u' does both"), "{message}");
+}
+
 #[test]
 fn equations_that_do_not_add_up_are_refused() {
-    let linear = |from: &str, to: &str| {
-        let model = GreyBox::from_toml(&TEXT.replace(from, to)).unwrap();
-        assert!(TEXT.contains(from));
-        EquationsModel::new(&model, &[1.7, -0.4], vec![vec![0.04, 0.0], vec![0.0, 0.09]], &[1e-4, 1e-4])
-            .linear("this test")
-            .is_ok()
-    };
+    let linear = |from: &str, to: &str| changed(from, to).unwrap().linear("this test").is_ok();
     // What the time adds is none of the inputs' matter.
     assert!(linear("+ u'", "+ 2 * u'") && linear("+ u'", "+ u + sin(t)'"));
     for bent in ["+ u^2'", "+ u * a'", "+ max(u, 0)'", "+ sin(b)'", "+ u * t'"] {

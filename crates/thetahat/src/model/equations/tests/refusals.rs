@@ -103,7 +103,11 @@ fn every_error_says_where_it_is_and_what_to_do() {
             "start = 2, sd = 0",
             "line 11, column 26: 'parameters.mass.sd' is 0: it must be above 0",
         ),
-        ("start = 2, sd = 1", "start = 2", "line 11, column 1: the unknown parameter 'mass' needs 'sd'"),
+        (
+            "start = 2, sd = 1, unknown = true, min = 0.1",
+            "start = 0, unknown = true",
+            "line 11, column 1: the unknown parameter 'mass' starts at 0 and needs 'sd'",
+        ),
         (
             "start = 2, sd = 1",
             "start = 0.05, sd = 1",

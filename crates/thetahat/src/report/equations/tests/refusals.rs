@@ -111,7 +111,7 @@ fn what_the_log_leaves_open_is_named() {
         "gain = {{ start = 0.5, {UNKNOWN} }}\nscale = {{ start = 2, {UNKNOWN} }}\naside = 0\nloss = {{ start = 0.2, {UNKNOWN} }}"
     ));
     assert_eq!(names, ["gain", "scale"]);
-    assert!(message.starts_with("the log cannot tell 'gain' and 'scale' apart"), "{message}");
+    assert!(message.starts_with("the data cannot tell 'gain' and 'scale' apart"), "{message}");
 
     let (names, message) = open(&format!(
         "gain = {{ start = 0.5, {UNKNOWN} }}\nscale = 1\naside = {{ start = 1, {UNKNOWN} }}\nloss = {{ start = 0.2, {UNKNOWN} }}"

@@ -114,7 +114,8 @@ impl EquationsModel {
     }
 }
 
-/// By how many samples the last of each input is late, and the coefficients of each output. O(n^4 + n^3 m e) for e ways.
+/// By how many samples the last of each input is late, and the coefficients of each output. O(n^4 + n^3 m e) for e ways
+/// by which inputs come in.
 ///
 /// # Errors
 /// [`Error::Argument`] for a delay of more samples than an order may have.

@@ -45,6 +45,9 @@ impl<'a> Drive<'a> {
     /// ```text
     /// mean = (1/h) ∫ u(s - delay) ds from t to t + h,   d mean/d delay = (u(t - delay) - u(t + h - delay))/h
     /// ```
+    ///
+    /// Where an end of the span is that of a row, as with a delay of whole rows, the slope is that of a delay that
+    /// grows: u is taken just before it.
     pub(super) fn delayed(
         &self,
         input: usize,
@@ -77,7 +80,8 @@ impl<'a> Drive<'a> {
         }
         let last = self.of_row(row, input);
         sum += last * (to - at);
-        (sum / span, (self.of_row(first, input) - last) / span)
+        let before = if self.times[first] < from { first } else { first.saturating_sub(1) };
+        (sum / span, (self.of_row(before, input) - last) / span)
     }
 
     fn is_linear(&self, input: usize) -> bool {
@@ -135,6 +139,8 @@ mod tests {
         // From 3.5 to 4.5; before the first row.
         assert_eq!(at(0.5), (0.5 * -2.0 + 0.5 * 5.0, -2.0 - 5.0));
         assert_eq!(at(30.0), (1.0, 0.0));
+        // From 2 to 3, where a longer delay lets more of the row before in; from 1 to 2.
+        assert_eq!((at(2.0), at(3.0)), ((-2.0, 5.0), (3.0, -2.0)));
         // Over several rows at once.
         let long = drive(&[], 4).delayed(0, 4.0, (4.5, 4.0), 4.0).0;
         assert_eq!(long, (0.5 * 1.0 + 3.0 - 2.0 * 2.0 + 0.5 * 5.0) / 4.0);

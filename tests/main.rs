@@ -4,6 +4,7 @@ mod arima;
 mod bad_input;
 mod bad_options;
 mod bad_report;
+mod blocks;
 mod bode;
 mod browser;
 #[path = "../crates/thetahat-c/tests/interface/library.rs"]

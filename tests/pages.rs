@@ -193,7 +193,7 @@ fn is_printed(expected: &[String], printed: &str) -> bool {
 fn run(page: &Page) -> usize {
     let folder = Folder::new();
     folder.done("demo");
-    for subfolder in ["public", "columnar", "flights", "spreadsheets", "templates"]
+    for subfolder in ["public", "columnar", "flights", "spreadsheets", "templates", "blocks"]
         .map(|name| format!("tests/data/{name}"))
     {
         fs::create_dir_all(folder.path(&subfolder)).expect("the folder can be written to");
@@ -202,9 +202,9 @@ fn run(page: &Page) -> usize {
     let columnar = files("tests/data/columnar", ".parquet");
     let flights = files("tests/data/flights", ".ulg");
     let sheets = files("tests/data/spreadsheets", ".xlsx");
-    let templates = files("tests/data/templates", ".csv");
+    let simulated = ["templates", "blocks"].map(|name| files(&format!("tests/data/{name}"), ".csv")).concat();
     let own = [files("tests/data", ".toml"), files("tests/data", ".csv")].concat();
-    for file in [own, public, columnar, flights, sheets, templates].concat() {
+    for file in [own, public, columnar, flights, sheets, simulated].concat() {
         folder.write(&file, fs::read(root().join(&file)).expect("data"));
     }
     let (mut compared, mut code) = (0, 0);

@@ -1,6 +1,7 @@
 //! Simulates the logs of the models beside it, with the noises that they tell of. Write the logs anew with
 //! `cargo run --example simulated_logs`.
 
+mod simulated_blocks;
 mod simulated_templates;
 
 use std::fmt::Write;
@@ -127,10 +128,18 @@ fn heater_steps() -> String {
     csv
 }
 
+/// Those of templates and of models in blocks, by their files.
+fn logs() -> Vec<(String, String)> {
+    let of = |folder: &str, logs: Vec<(&str, String)>| -> Vec<(String, String)> {
+        logs.into_iter().map(|(name, log)| (format!("{folder}/{name}.csv"), log)).collect()
+    };
+    [of("templates", simulated_templates::logs()), of("blocks", simulated_blocks::logs())].concat()
+}
+
 fn main() -> std::io::Result<()> {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
-    for (name, log) in simulated_templates::logs() {
-        std::fs::write(folder.join("templates").join(format!("{name}.csv")), log)?;
+    for (name, log) in logs() {
+        std::fs::write(folder.join(name), log)?;
     }
     std::fs::write(folder.join("mass_spring_damper.csv"), mass_spring_damper())?;
     std::fs::write(folder.join("battery.csv"), battery())?;
@@ -144,11 +153,8 @@ fn the_logs_beside_this_program_are_what_it_writes() {
     assert!(include_str!("battery.csv") == battery());
     assert!(include_str!("heater_steps.csv") == heater_steps());
     assert!(include_str!("dc_motor.csv") == dc_motor());
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/templates");
-    for (name, log) in simulated_templates::logs() {
-        assert!(
-            std::fs::read_to_string(folder.join(format!("{name}.csv"))).is_ok_and(|text| text == log),
-            "{name}"
-        );
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    for (name, log) in logs() {
+        assert!(std::fs::read_to_string(folder.join(&name)).is_ok_and(|text| text == log), "{name}");
     }
 }

@@ -18,7 +18,8 @@ use thetahat::spectrum::SpectrumOptions;
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../py/python/thetahat/engine/option_types.py");
 
 /// The parameters that functions have before their options: what the model is about, its structure and its orders.
-const OWN_PARAMETERS: [&str; 24] = [
+const OWN_PARAMETERS: [&str; 25] = [
+    "blocks",
     "couple",
     "delay",
     "input",
@@ -46,7 +47,7 @@ const OWN_PARAMETERS: [&str; 24] = [
 ];
 
 /// A class of the options of a fit, what it says, and the kind of model whose options it has.
-const FITS: [(&str, &str, Kind); 7] = [
+const FITS: [(&str, &str, Kind); 8] = [
     (
         "FitOptions",
         "What every fit of a model of polynomials can be told, beside the orders.",
@@ -57,6 +58,7 @@ const FITS: [(&str, &str, Kind); 7] = [
     ("StateSpaceOptions", "What a fit of a model in state space can be told.", Kind::STATE_SPACE),
     ("ProcessOptions", "What a fit of a process in continuous time can be told.", Kind::PROCESS),
     ("NarxOptions", "What a fit of a nonlinear ARX model can be told.", Kind::NONLINEAR_ARX),
+    ("BlocksOptions", "What a fit of a model in blocks can be told.", Kind::BLOCKS),
     ("EquationsOptions", "What a fit of a model in equations can be told.", Kind::EQUATIONS),
 ];
 

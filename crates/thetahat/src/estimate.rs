@@ -8,6 +8,7 @@
 //! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`] with a [`Weighting`]); of
 //!   the [`Subspace`] a [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says
 //!   how well it predicts.
+//! - A [`BlockStructure`] says how linear systems and curves, of a [`CurveForm`], follow one another in a model in blocks.
 //! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.
@@ -38,6 +39,7 @@
 
 mod arima;
 mod arx;
+mod blocks;
 mod common;
 mod criteria;
 mod criterion;
@@ -89,6 +91,8 @@ use crate::model::{PolynomialModel, Signal};
 pub(crate) use arima::{ArimaData, ArimaEstimate, arima};
 pub use arx::{arx, arx_factor};
 pub(crate) use arx::{enough, estimate_is_for_f, lagged_products, out_of_range, taps};
+pub use blocks::{BlockStructure, CurveForm};
+pub(crate) use blocks::{BlocksOptions, blocks};
 pub(crate) use common::{Common, Point, Window};
 pub use criteria::{Criteria, InformationCriterion};
 pub use criterion::{Bound, ConvexFit, ConvexOutcome, GainBound, Norm};

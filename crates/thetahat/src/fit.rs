@@ -4,6 +4,7 @@
 //! its channels, which [`FitPlan::fit`] carries out. [`FitPlan::pieces`] are for logs that are read part by part.
 
 mod arima;
+mod blocks;
 mod method;
 mod nonlinear_arx;
 mod orders;
@@ -28,6 +29,7 @@ use crate::report::{
 };
 use crate::spectrum::MeasuredResponse;
 use arima::ArimaDraft;
+use blocks::BlocksDraft;
 use nonlinear_arx::NonlinearArxDraft;
 use polynomial::PolynomialDraft;
 use process::ProcessDraft;
@@ -163,6 +165,7 @@ impl FitDraft {
             }
             Kind::PROCESS | Kind::RESPONSE => Box::new(ProcessDraft::new(options, fitted)?),
             Kind::NONLINEAR_ARX => Box::new(NonlinearArxDraft::new(options)?),
+            Kind::BLOCKS => Box::new(BlocksDraft::new(options)?),
             Kind::EQUATIONS => Box::new(equations(options)?),
             _ => return Err(Error::argument("model", "a log does not say a model of this kind")),
         };

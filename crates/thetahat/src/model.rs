@@ -48,7 +48,7 @@ pub use convert::TimeBase;
 pub(crate) use dynamics::{
     Block, Blocks, Gradient, cancel, covariance, is_simple, near_cancellation, standard_error,
 };
-pub(crate) use equations::{ChannelExpression, ExpressionBuffer};
+pub(crate) use equations::{ChannelExpression, ExpressionBuffer, toml_text};
 pub use equations::{DerivedFigure, EquationsModel, GreyBox};
 pub(crate) use fitted::is_covariance;
 pub use fitted::{ArimaFactors, OffsetCovariance, Parameter, PolynomialModel, Signal};

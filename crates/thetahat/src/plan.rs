@@ -12,6 +12,6 @@ mod words;
 pub use asked::Fitted;
 pub use fit::FitOptions;
 pub use words::{
-    CoupleWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord, ModelWord,
-    NormOption, OrderOption, SeasonalOption, StepOption,
+    CoupleWord, CurveWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord,
+    ModelWord, NormOption, OrderOption, SeasonalOption, StepOption,
 };

@@ -44,6 +44,7 @@
 
 mod apply;
 mod arima;
+mod blocks;
 mod convert;
 mod equations;
 mod evaluate;
@@ -77,6 +78,7 @@ mod warnings;
 
 pub use apply::{Applied, AppliedOutput, apply};
 pub use arima::{ArimaPlan, fit_arima};
+pub use blocks::{BlocksPlan, fit_blocks};
 pub use equations::{
     EquationsPlan, answer_equations, fit_equations, fit_equations_distributed, fit_equations_to_response,
 };

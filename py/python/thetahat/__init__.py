@@ -10,9 +10,8 @@ Logs            `Log`, `read_log`, `read_csv`, `topics` of the log of a flight, 
 Fits            `fit` takes the model that the data ask for, `search` chooses among orders, `fit_many` does it with many logs.
   polynomials   `arx`, `armax`, `oe`, `bj`, `general`, `fir`, `iv`, `sriv`, `NormalEquations` part by part.
   time series   `arima` with differences and seasons, `ar`, `arma`.
-  others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `grey` and `GreyBox` equations,
-                with `table`, `where` and `delayed`;
-                `templates` of plants that are ready.
+  others        `ss` state space, `process` and `tf` in continuous time, `narx` nonlinear ARX, `blocks` of systems and curves,
+                `grey` and `GreyBox` equations, with `table`, `where` and `delayed`; `templates` of plants that are ready.
 Models          `Model` predicts, simulates, forecasts, validates, converts and exports; `Model.from_polynomials`,
                 `from_transfer_function`, `from_state_space`, `from_control` and `from_scipy` make it of known numbers.
                 `compare` lays several side by side.
@@ -73,6 +72,7 @@ from thetahat.controllers.tune import Tuning, tune
 from thetahat.engine import signatures as _signatures
 from thetahat.engine.option_types import (
     ArimaOptions,
+    BlocksOptions,
     DesignOptions,
     EquationsOptions,
     FitOptions,
@@ -89,6 +89,7 @@ from thetahat.experiments.spectrum import MeasuredResponse, spectrum
 from thetahat.experiments.step_test import StepTest, step_test
 from thetahat.fits import templates as templates
 from thetahat.fits.arima import arima
+from thetahat.fits.blocks import blocks
 from thetahat.fits.comparison import Comparison, compare
 from thetahat.fits.expressions import delayed, table, where
 from thetahat.fits.fit import ar, arma, armax, arx, bj, fir, fit, general, oe, search
@@ -119,6 +120,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Alarm",
     "ArimaOptions",
+    "BlocksOptions",
     "ChangeDetector",
     "ChangeTrajectory",
     "Comparison",
@@ -195,6 +197,7 @@ __all__ = [
     "armax",
     "arx",
     "bj",
+    "blocks",
     "closed_loop",
     "compare",
     "dc_motor",

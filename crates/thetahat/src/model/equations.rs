@@ -23,7 +23,7 @@ mod table;
 pub(crate) mod tests;
 
 pub(crate) use channels::{ChannelExpression, ExpressionBuffer};
-pub(crate) use document::{Document, Entry, Section, suggestion};
+pub(crate) use document::{Document, Entry, Section, suggestion, toml_text};
 pub(crate) use drive::Drive;
 use dynamics::Functions;
 pub(crate) use dynamics::{Step, Work};
@@ -64,9 +64,12 @@ use crate::Error;
 /// mass = { start = 2, sd = 1, unknown = true, min = 0.1 }
 /// damping = 0.4
 ///
+/// [signals]                          # names for expressions, if there are any
+/// friction = "damping * velocity"
+///
 /// [next]                             # or [derivative]
 /// position = "position + dt * velocity"
-/// velocity = "velocity + dt * (force - damping * velocity) / mass"
+/// velocity = "velocity + dt * (force - friction) / mass"
 ///
 /// [outputs]                          # channel of the log = expression
 /// y = "position"
@@ -171,6 +174,8 @@ pub struct GreyBox {
     delays: Vec<Option<f64>>,
     linear: bool,
     superposes: bool,
+    /// Whether derivatives by the states are the same in all states, with all inputs and at all times.
+    is_affine_in_states: bool,
     transition: Functions,
     observation: Functions,
     entrances: Entrances,

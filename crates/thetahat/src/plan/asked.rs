@@ -51,6 +51,9 @@ impl FitOptions {
             Fitted::Response => return Asked { kind: Kind::RESPONSE, because: because("`from`") },
             Fitted::Log { several_outputs } => several_outputs || self.output.len() > 1,
         };
+        if self.blocks.is_some() {
+            return Asked { kind: Kind::BLOCKS, because: because("`blocks`") };
+        }
         if self.narx.is_some_and(|map| map != MapWord::None) {
             return Asked { kind: Kind::NONLINEAR_ARX, because: because("`narx`") };
         }

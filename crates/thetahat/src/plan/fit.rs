@@ -3,11 +3,11 @@
 use thetahat_numerics::optimize::Algorithm;
 
 use super::words::{
-    CoupleWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord, ModelWord,
-    NormOption, OrderOption, SeasonalOption, StepOption,
+    CoupleWord, CurveWord, DelayRange, FeedthroughWord, KernelWord, LikelihoodWord, MapWord, MethodWord,
+    ModelWord, NormOption, OrderOption, SeasonalOption, StepOption,
 };
 use crate::data::{Detrend, Prefilter, Rows, Split};
-use crate::estimate::{Bound, Constant, GainBound, Initial, Refine, Weighting};
+use crate::estimate::{BlockStructure, Bound, Constant, GainBound, Initial, Refine, Weighting};
 use crate::model::{Membership, ProcessStructure};
 use crate::options::{ColumnName, Kind, NamedValue, Options, options};
 use crate::select::{Focus, OrderRange, Path, Select};
@@ -17,6 +17,7 @@ const MODEL: &str = "Model";
 const SEASONS: &str = "Seasonal ARIMA (`model` arima)";
 const STATES: &str = "State space (`model` ss)";
 const NARX: &str = "Nonlinear ARX";
+const BLOCKS: &str = "Blocks";
 const CHOICE: &str = "Choice (orders that are ranges, or not given)";
 const SEARCH: &str = "Search (models with C, D or F, in equations, and trained)";
 const CRITERION: &str = "Criterion (all but `norm` for models without C, D and F)";
@@ -28,6 +29,7 @@ const S: Kind = Kind::STATE_SPACE;
 const V: Kind = Kind::VECTOR_ARX;
 const C: Kind = Kind::PROCESS;
 const N: Kind = Kind::NONLINEAR_ARX;
+const B: Kind = Kind::BLOCKS;
 const E: Kind = Kind::EQUATIONS;
 const R: Kind = Kind::RESPONSE;
 const Q: Kind = Kind::RESPONSE_STATES;
@@ -51,13 +53,13 @@ options! {
     /// ```
     FitOptions of "a fit" {
         /// Input columns; a name that holds a comma stands between double quotes, as in CSV
-        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N R A Q];
+        input: Vec<ColumnName>, "NAME[,NAME…]", "u, u1, u2, …", CHANNELS, [P I S V C N B R A Q];
         /// Output column; with `model` ss, `model` arx and `narx` one or more
-        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N A R Q];
+        output: Vec<ColumnName>, "NAME[,NAME…]", "y", CHANNELS, [P I S V C N B A R Q];
         /// Rows to estimate on, 1-based and inclusive, counted through all logs
-        estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N E A];
+        estimate: Vec<Rows>, "A..B[,C..D]", "all", CHANNELS, [P I S V C N B E A];
         /// Rows to validate on
-        validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N E A];
+        validate: Vec<Rows>, "A..B[,C..D]", "", CHANNELS, [P I S V C N B E A];
         /// What to subtract from each channel before the fit: none, mean, linear, or start:K (the mean of the first K
         /// rows); `constant` and `trend` estimate the remaining level and slope of the output
         detrend: Option<Detrend>, "WHAT", "mean", CHANNELS, [P I S V N];
@@ -84,7 +86,7 @@ options! {
         nf: Vec<OrderRange>, "N|A..B[,…]", "", MODEL, [P];
         /// The delay in samples from the input to its first effect, one value for each input or one for all; 0: the
         /// input acts in the same sample
-        nk: Vec<DelayRange>, "N|A..B[,…]", "1, arima 0; without orders the data choose", MODEL, [P I S V N A Q];
+        nk: Vec<DelayRange>, "N|A..B[,…]", "1, arima 0; without orders the data choose", MODEL, [P I S V N B A Q];
         /// Taps of an impulse response (`model` fir): g(nk), g(nk+1), …; one value for each input or one for all
         taps: Vec<usize>, "N[,…]", "", MODEL, [I];
         /// The prior of an impulse response (`model` fir): that it decays and is smooth
@@ -121,7 +123,7 @@ options! {
         trend: bool, "", "", MODEL, [P I C A];
         /// p,d,q of a seasonal ARIMA model (`model` arima): autoregressive parameters, differences and parameters of
         /// the moving average. The number of states (`model` ss), or a range, from which the least MDL is chosen
-        order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20", SEASONS, [S A Q];
+        order: Option<OrderOption>, "p,d,q|N|A..B", "of states 1..20, with `blocks` 1..3", SEASONS, [S A Q B];
         /// The same over seasons, and the rows that a season has: P,D,Q,s. Inputs, if `input` names any, act on the
         /// output in the same row unless `nk` says otherwise, and all else is the noise
         seasonal: Option<SeasonalOption>, "P,D,Q,s", "no seasons", SEASONS, [A];
@@ -148,8 +150,8 @@ options! {
         /// A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in it; may
         /// be repeated
         regressor: Vec<String>, "EXPRESSION", "", NARX, [N];
-        /// The largest number of factors of a product (poly)
-        degree: Option<usize>, "D", "2", NARX, [N];
+        /// The largest number of factors of a product (poly), or the degree of curves (`curve` poly)
+        degree: Option<usize>, "D", "2, of curves 3", NARX, [N B];
         /// The number of functions in the model
         terms: Option<usize>, "N",
             "as `select` says, by the free run on validation rows, or on blocks of the estimation rows", NARX, [N];
@@ -176,21 +178,28 @@ options! {
         drawn: bool, "", "", NARX, [N];
         /// Keep signals in their own units; without it each is divided by its standard deviation
         raw_terms: bool, "", "", NARX, [N];
+        /// Fit linear systems and static curves that follow one another, for the least errors of the free run; the
+        /// report is one of a model in equations
+        blocks: Option<BlockStructure>, "STRUCTURE", "", BLOCKS, [B];
+        /// The form of static curves
+        curve: Option<CurveWord>, "FORM", "lines, of a feedback poly", BLOCKS, [B];
+        /// Knots of curves of lines
+        knots: Option<usize>, "N", "chosen", BLOCKS, [B];
         /// Which models of the ranges are compared
         path: Option<Path>, "PATH", "all", CHOICE, [P];
         /// The criterion of the choice
         select: Option<Select>, "CRITERION", "mdl", CHOICE, [P N];
         /// Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is fitted
         /// again to the first two and evaluated on the third; 0 for no such part
-        split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N E A];
+        split: Option<Split>, "E/V/T", "", CHOICE, [P I S V C N B E A];
         /// The search algorithm
-        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N E R A Q];
+        search: Option<Algorithm>, "HOW", "lm", SEARCH, [P S C N B E R A Q];
         /// The largest number of iterations from each start
-        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N E R A Q];
+        max_iterations: Option<usize>, "N", "100, with `narx` 500", SEARCH, [P S C N B E R A Q];
         /// Stop where the next step would lower the cost by less than this fraction
-        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N E R A Q];
+        tolerance: Option<f64>, "FRACTION", "1e-8", SEARCH, [P S C N B E R A Q];
         /// Step length of the gradient search: C1, or C1/(C2 + l) in iteration l
-        step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N E R Q];
+        step: Option<StepOption>, "C1[,C2]", "1", SEARCH, [P S C N B E R Q];
         /// Search from this many further starts
         starts: Option<usize>, "K", "0, with `narx` 4, with `grey` some where the first one fails", SEARCH, [P C N E R];
         /// Add intervals of 95 % by profile likelihood, which know bounds and curvature; some twenty searches for each
@@ -199,7 +208,7 @@ options! {
         /// The seed of random starts and of random centres
         seed: Option<u64>, "S", "0", SEARCH, [P N E];
         /// After this time begin no iteration and no search from a further start
-        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N E R A Q];
+        time_limit: Option<f64>, "SECONDS", "", SEARCH, [P S C N B E R A Q];
         /// The norm of the errors to minimise: 2, the sum of squares; 1, the sum of absolute values, which is robust to
         /// outliers; huber or huber:K, squares up to K times the scale of the errors and absolute values beyond (K =
         /// 1.345 by default); inf, the largest error

@@ -107,6 +107,7 @@ fn a_kind_of_model_takes_its_own_options() -> Result<(), Error> {
         (r#"{"structure": "p1"}"#, Fitted::Response, Kind::RESPONSE),
         (r#"{"model": "ss", "order": "1..4"}"#, Fitted::Response, Kind::RESPONSE_STATES),
         (r#"{"narx": "auto"}"#, log, Kind::NONLINEAR_ARX),
+        (r#"{"blocks": "wh"}"#, log, Kind::BLOCKS),
         ("{}", Fitted::Equations, Kind::EQUATIONS),
         ("{}", Fitted::Log { several_outputs: true }, Kind::STATE_SPACE),
         (r#"{"output": ["a", "b"], "nb": 0}"#, log, Kind::STATE_SPACE),
@@ -123,7 +124,7 @@ fn a_kind_of_model_takes_its_own_options() -> Result<(), Error> {
         ),
         (r#"{"na": 2, "model": "ss"}"#, log, "na: does not work with `model` ss; leave one of the two out"),
         (r#"{"na": 2}"#, Fitted::Equations, "na: does not work with `grey`; leave one of the two out"),
-        (r#"{"degree": 2}"#, log, "degree: it is for `narx`; leave it out, or give that"),
+        (r#"{"degree": 2}"#, log, "degree: it is for `narx` and `blocks`; leave it out, or give that"),
         (r#"{"past": 2, "output": ["a", "b"], "na": 1}"#, log, "past: does not work with several outputs"),
         (r#"{"couple": "full"}"#, log, "couple: it is for `model` arx with several outputs; leave it out"),
     ] {

@@ -3,7 +3,7 @@
 use thetahat_numerics::optimize::Algorithm;
 
 use crate::data::{Prefilter, Split};
-use crate::estimate::{Bound, Constant, GainBound, Initial, Loss, Refine, Weighting};
+use crate::estimate::{BlockStructure, Bound, Constant, GainBound, Initial, Loss, Refine, Weighting};
 use crate::model::{Membership, ProcessStructure};
 use crate::options::{Form, Kind, OptionText, Word, none_of, texts, words};
 use crate::select::{Focus, OrderRange, Path, Select};
@@ -81,6 +81,8 @@ impl Kind {
     pub const VECTOR_ARX: Self = Self::new("`model` arx with several outputs");
     /// A process in continuous time.
     pub const PROCESS: Self = Self::new("`structure` and `np`");
+    /// A model in blocks.
+    pub const BLOCKS: Self = Self::new("`blocks`");
     /// A nonlinear ARX model.
     pub const NONLINEAR_ARX: Self = Self::new("`narx`");
     /// A model in equations.
@@ -188,6 +190,27 @@ words! { of FeedthroughWord {
     Auto "auto" "Decided from the data",
     Yes "yes" "D is estimated",
     No "no" "D is zero",
+}}
+
+words! { of BlockStructure {
+    Hammerstein "hammerstein" "A curve of each input, then a linear system: a valve, a pump, a heater that saturates",
+    Wiener "wiener" "A linear system, then a curve: a sensor",
+    WienerHammerstein "wiener-hammerstein" | "wh" "A curve between two linear systems",
+    Feedback "feedback" | "lfr" "A linear system around a curve: a spring, friction, an outflow",
+}}
+
+/// The form of static curves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CurveWord {
+    /// Straight lines between knots.
+    Lines,
+    /// Powers.
+    Poly,
+}
+
+words! { of CurveWord {
+    Lines "lines" "Straight lines from knot to knot",
+    Poly "poly" "A polynomial, of degree 3 unless `degree` says otherwise",
 }}
 
 /// The functions of a nonlinear ARX model.

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::task::Task;
+use crate::model::toml_text;
 
 /// A model, with the values from which a fit starts.
 #[derive(Debug, Clone, Default)]
@@ -108,7 +109,7 @@ impl Draft {
             text.push_str("\n[inputs]\n");
         }
         for (name, column) in &self.inputs {
-            let line = format!("{name} = {}", quoted(task.channel(*column)));
+            let line = format!("{name} = {}", toml_text(task.channel(*column)));
             let _ = writeln!(text, "{line:<44} # {}", task.template.columns[*column].unit);
         }
         text.push_str("\n[parameters]\n");
@@ -121,7 +122,7 @@ impl Draft {
         }
         text.push_str("\n[outputs]\n");
         for Output { column, expression, .. } in &self.outputs {
-            let line = format!("{} = \"{expression}\"", quoted(task.channel(*column)));
+            let line = format!("{} = \"{expression}\"", toml_text(task.channel(*column)));
             let _ = writeln!(text, "{line:<44} # {}", task.template.columns[*column].unit);
         }
         text.push_str("\n[noise]\n");
@@ -143,7 +144,7 @@ impl Draft {
         // A sensor is not better than a part of what its values scatter by from row to row, or are rounded to.
         let each = self.outputs.iter().map(|output| {
             let (channel, least) = (task.channel(output.column), 0.1 * task.noise(output.column));
-            noise("measurement", channel, &quoted(channel), output.noise.max(2.0 * least), least)
+            noise("measurement", channel, &toml_text(channel), output.noise.max(2.0 * least), least)
         });
         let _ = writeln!(text, "measurement = {{ {} }}", each.collect::<Vec<_>>().join(", "));
         if !self.figures.is_empty() {
@@ -187,23 +188,4 @@ fn short(value: f64) -> String {
     } else {
         format!("{rounded}")
     }
-}
-
-/// A name as TOML writes it where it may have blanks.
-fn quoted(name: &str) -> String {
-    let mut text = String::from("\"");
-    for letter in name.chars() {
-        match letter {
-            '"' | '\\' => {
-                text.push('\\');
-                text.push(letter);
-            }
-            control if control.is_control() => {
-                let _ = write!(text, "\\u{:04X}", u32::from(control));
-            }
-            letter => text.push(letter),
-        }
-    }
-    text.push('"');
-    text
 }

@@ -397,7 +397,8 @@ class NarxOptions(TypedDict, total=False):
         A further argument of g, an expression of channels such as 'sqrt(u)', at the lags of the channels in
         it; may be repeated
     degree
-        The largest number of factors of a product (poly) [default: 2]
+        The largest number of factors of a product (poly), or the degree of curves (``curve`` poly) [default:
+        2, of curves 3]
     terms
         The number of functions in the model; or products by name, as ``Model.parameter_names`` has them
         [default: as ``select`` says, by the free run on validation rows, or on blocks of the estimation
@@ -484,6 +485,54 @@ class NarxOptions(TypedDict, total=False):
     seed: Optional[int]
     time_limit: Optional[float]
     ridge: Optional[float]
+
+
+class BlocksOptions(TypedDict, total=False):
+    """What a fit of a model in blocks can be told.
+
+    Attributes
+    ----------
+    estimate
+        Rows to estimate on, 1-based and inclusive, counted through all logs [default: all]
+    validate
+        Rows to validate on
+    degree
+        The largest number of factors of a product (poly), or the degree of curves (``curve`` poly) [default:
+        2, of curves 3]
+    curve
+        The form of static curves; ``"lines"``: Straight lines from knot to knot; ``"poly"``: A polynomial,
+        of degree 3 unless ``degree`` says otherwise [default: lines, of a feedback poly]
+    knots
+        Knots of curves of lines [default: chosen]
+    split
+        Cut the rows in time order into parts: models are fitted to the first and compared, the chosen one is
+        fitted again to the first two and evaluated on the third; 0 for no such part
+    search
+        The search algorithm; ``"lm"``: Levenberg and Marquardt; ``"gauss-newton"``: Gauss and Newton; the
+        step is halved until the cost falls; ``"newton"``: Newton and Raphson with the full Hessian;
+        ``"gradient"``: Steepest descent; ``"annealing"``: Simulated annealing, then lm from the best point
+        found [default: lm]
+    max_iterations
+        The largest number of iterations from each start [default: 100, with ``narx`` 500]
+    tolerance
+        Stop where the next step would lower the cost by less than this fraction [default: 1e-8]
+    step
+        Step length of the gradient search: C1, or C1/(C2 + l) in iteration l [default: 1]
+    time_limit
+        After this time begin no iteration and no search from a further start
+    """
+
+    estimate: Optional[Rows]
+    validate: Optional[Rows]
+    degree: Optional[int]
+    curve: Optional[Literal["lines", "poly"]]
+    knots: Optional[int]
+    split: Optional[Union[str, tuple[float, float, float]]]
+    search: Optional[Literal["lm", "gauss-newton", "newton", "gradient", "annealing"]]
+    max_iterations: Optional[int]
+    tolerance: Optional[float]
+    step: Optional[Union[float, tuple[float, float]]]
+    time_limit: Optional[float]
 
 
 class EquationsOptions(TypedDict, total=False):

@@ -1,6 +1,7 @@
 //! A TOML file by hand, so that each error can say where it is.
 
 use std::borrow::Cow;
+use std::fmt::Write;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -20,6 +21,25 @@ pub(crate) fn error_at(text: &str, offset: usize, message: impl AsRef<str>) -> E
 /// A word as it is quoted in an error: not too long, and without control characters.
 pub(crate) fn quoted(word: &str) -> String {
     format!("'{}'", text::brief(word, 40))
+}
+
+/// A name as TOML writes it where it may have blanks.
+pub(crate) fn toml_text(name: &str) -> String {
+    let mut text = String::from("\"");
+    for letter in name.chars() {
+        match letter {
+            '"' | '\\' => {
+                text.push('\\');
+                text.push(letter);
+            }
+            control if control.is_control() => {
+                let _ = write!(text, "\\u{:04X}", u32::from(control));
+            }
+            letter => text.push(letter),
+        }
+    }
+    text.push('"');
+    text
 }
 
 /// A TOML document that was parsed.

@@ -24,6 +24,8 @@ pub(super) struct Noise {
     measurement: Program,
     /// Whether the two before are functions of parameters alone.
     is_constant: [bool; 2],
+    /// Whether no noise moves the states.
+    is_absent: bool,
 }
 
 /// The nodes of the same.
@@ -41,6 +43,7 @@ impl Noise {
             process: Program::new(graph, &nodes.process),
             measurement: Program::new(graph, &nodes.measurement),
             is_constant: [is_constant(&nodes.process), is_constant(&nodes.measurement)],
+            is_absent: nodes.process.iter().all(|node| graph.known(*node) == Some(0.0)),
         }
     }
 }
@@ -124,7 +127,12 @@ impl GreyBox {
     /// Whether the covariances of a filter depend on parameters and the steps alone: the equations are linear in the
     /// states, whose derivatives are the same at any time, and so are the noises.
     pub(crate) fn has_constant_covariances(&self) -> bool {
-        self.superposes && self.noise.is_constant == [true; 2]
+        self.is_affine_in_states && self.noise.is_constant == [true; 2]
+    }
+
+    /// Whether states that are known stay known, whatever the equations: no noise moves them.
+    pub(crate) fn keeps_certainty(&self) -> bool {
+        self.noise.is_absent && self.noise.is_constant == [true; 2]
     }
 
     /// The programs of the variances, per sample of the states, and of the outputs, each with whether it is the same in

@@ -26,6 +26,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         "states",
         "inputs",
         "parameters",
+        "signals",
         "next",
         "derivative",
         "outputs",
@@ -70,8 +71,13 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         };
         scope.declare(entry.key, node, &entry)?;
     }
+    let last_parameter = scope.names.len();
     let mut reader = Reader { scope: &scope, graph: &mut graph, unknown: &mut unknown, known };
     let started = states.iter().map(|state| reader.start(state)).collect::<Result<Vec<_>, _>>()?;
+    for signal in root.section("signals")?.iter().flat_map(Section::entries) {
+        let node = scope.read(&signal, &mut graph)?;
+        scope.declare(signal.key, node, &signal)?;
+    }
 
     let (step, equations) = equations(&root)?;
     let written = equations.entries();
@@ -142,8 +148,9 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         drives.iter().for_each(|&drive| slopes.extend(graph.derivatives(functions, drive)));
         !graph.depends(&slopes, Operation::moves) && !graph.jumps(functions, Operation::moves)
     };
+    let is_affine_in_states = !graph.depends(&by_states, Operation::moves) && !graph.jumps(&all, is_state);
     let superposes = is_linear(&mut graph, &all, by_states);
-    let known_names = &scope.names[first_parameter..];
+    let known_names = &scope.names[first_parameter..last_parameter];
     let figures = Figures::read(root.section("figures")?, known_names, unknown.len(), &mut graph)?;
     let any_step = step != Step::Next || graph.depends(&rates, |operation| operation == Operation::Step);
     let step = match step {
@@ -175,6 +182,7 @@ pub(super) fn model(text: &str, known: &[(String, f64)]) -> Result<GreyBox, Erro
         outputs: outputs.iter().map(|entry| entry.key.to_owned()).collect(),
         linear,
         superposes,
+        is_affine_in_states,
         any_step,
         bends: has_lines,
         delays: longest_delays(&graph, inputs.len(), &unknown),

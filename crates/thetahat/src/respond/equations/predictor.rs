@@ -95,7 +95,7 @@ impl<S: Number<f64>> Predictor<S> {
             projected: zeros(n),
             gains: zeros(m * n),
             variances: zeros(m),
-            settling: Settling::new(model.has_constant_covariances(), n * n),
+            settling: Settling::new(model.has_constant_covariances(), model.keeps_certainty(), n * n),
             is_held: false,
             work: Work::new(),
         }
@@ -197,7 +197,7 @@ impl<S: Number<f64>> Predictor<S> {
                 products.fold(zero, |sum, ((&other, &own), &weight)| sum + other * own * weight)
             };
             let pivot = weighted(own, &self.weights);
-            self.factor[index * n + index] = pivot;
+            self.factor[index * n + index] = if pivot.value() > NEGLIGIBLE { pivot } else { zero };
             for row in 0..index {
                 let other = &mut before[row * width..][..columns];
                 // Where nothing is uncertain, the column does not matter.

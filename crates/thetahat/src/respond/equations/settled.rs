@@ -12,6 +12,8 @@
 //! rounding says that c rho^(k/2) is, and P(k) is closer yet, however slow the filter is. From there on the state alone
 //! goes from row to row, until a row is unlike: another step, or another output that is missing. After it the limit is
 //! known, and it is enough to be back.
+//!
+//! Without noise that moves the states P = 0 is such a limit of nonlinear models too: K is 0 and S = R whatever F is.
 
 use thetahat_core::Number;
 
@@ -25,6 +27,8 @@ const FEWEST: usize = 32;
 pub(super) struct Settling<S> {
     /// Whether F, Q, H and R depend on parameters and the step alone.
     has_limit: bool,
+    /// Whether it stays 0 where it is: no noise moves the states.
+    stays_zero: bool,
     /// The limit, and a row of those in which it is one.
     limit: Vec<S>,
     of_row: Option<usize>,
@@ -37,9 +41,18 @@ pub(super) struct Settling<S> {
 }
 
 impl<S: Number<f64>> Settling<S> {
-    pub(super) fn new(has_limit: bool, size: usize) -> Self {
+    pub(super) fn new(has_limit: bool, stays_zero: bool, size: usize) -> Self {
         let zeros = || vec![S::from(0.0); size];
-        Self { has_limit, limit: zeros(), of_row: None, is_there: false, last: None, alike: 0, half: zeros() }
+        Self {
+            has_limit,
+            stays_zero,
+            limit: zeros(),
+            of_row: None,
+            is_there: false,
+            last: None,
+            alike: 0,
+            half: zeros(),
+        }
     }
 
     /// Forgets everything: other parameters, or another log.
@@ -54,6 +67,11 @@ impl<S: Number<f64>> Settling<S> {
 
     /// Hears of the factors after a row. n^2 comparisons in few rows, and where the limit is known.
     pub(super) fn note(&mut self, row: usize, factor: &[S], is_alike: impl Fn(usize) -> bool) {
+        if self.stays_zero && factor.iter().all(is_zero) {
+            self.limit.copy_from_slice(factor);
+            (self.of_row, self.is_there) = (Some(row), true);
+            return;
+        }
         if !self.has_limit {
             return;
         }
@@ -69,6 +87,11 @@ impl<S: Number<f64>> Settling<S> {
         }
         self.half.copy_from_slice(factor);
     }
+}
+
+/// Whether a number is 0 whatever its variables are.
+fn is_zero<S: Number<f64>>(number: &S) -> bool {
+    number.value() == 0.0 && number.derivatives().iter().all(|derivative| *derivative == 0.0)
 }
 
 /// Whether numbers differ by rounding at most. The derivatives are by variables whose size is 1: those of parameters

@@ -58,14 +58,14 @@ fn options_of_blocks_go_together_or_are_refused() {
             "one delay for each input, or finds it",
         ),
         ("fit --blocks wiener log.csv -u valve -y flow --knots 5 --degree 3", 2, "they are of --curve lines"),
-        ("fit --blocks wiener log.csv -u valve -y flow,valve", 2, "one output"),
+        ("fit --blocks wiener log.csv -u valve -y flow,t --sample-time 1", 2, "one output"),
         ("fit --blocks feedback log.csv -u valve -y flow --curve lines", 2, "a feedback takes poly"),
         ("fit --curve lines log.csv -u valve -y flow", 2, "--curve"),
         ("fit --blocks wiener still.csv -u valve -y flow", 4, "'valve' does not move in these rows"),
         ("fit --blocks wiener one.csv -u valve -y flow --sample-time 1", 4, "does not move"),
         ("fit --blocks wiener log.csv -u valve -y flown", 3, "flown"),
     ] {
-        let clock = if words.contains("one.csv") { "" } else { " --time t" };
+        let clock = if words.contains("--sample-time") { "" } else { " --time t" };
         let refused = folder.refused(&format!("{words}{clock}"), code);
         assert!(refused.contains(said), "{words}: {refused}");
     }

@@ -4,7 +4,8 @@
 //! Hammerstein          y = G(q) f(u)                     a valve, a pump, a heater that switches
 //! Wiener               y = f(G(q) u)                     a sensor
 //! Wiener-Hammerstein   y = G2(q) f(G1(q) u)              an amplifier between two filters
-//! feedback             y = G(q) [u; w],  w = f(y)        a spring, friction, an outflow; or w = f(z), z linear in states and inputs
+//! feedback             y = G(q) [u; w],  w = f(z)        a spring, friction, an outflow; z is y, or any sum of states
+//!                                                        and inputs
 //! ```
 //!
 //! (Giri and Bai, Block-oriented Nonlinear System Identification, 2010, chapters 1 to 3; Schoukens and Toth 2020 for
@@ -132,7 +133,14 @@ pub(crate) fn blocks(
     let whole = Work { rows: usize::MAX, ..work };
     let found = whole.improved(&chosen, options.search.max_iterations)?.unwrap_or(chosen);
     let runs = whole.runs(&found.shape);
-    Ok(text::written(&found, &runs, (inputs, output), ((&whole.offsets.0, whole.offsets.1), sample_time)))
+    Ok(text::written(&found, &runs, (inputs, output), (&whole.offsets, sample_time)))
+}
+
+/// A number for each signal.
+#[derive(Debug, Clone)]
+struct Levels {
+    inputs: Vec<f64>,
+    output: f64,
 }
 
 /// A log and what is wanted of it.
@@ -140,8 +148,8 @@ struct Work<'a> {
     record: &'a Record<'a>,
     options: &'a BlocksOptions,
     /// What is subtracted from inputs and output.
-    offsets: (Vec<f64>, f64),
-    means: (Vec<f64>, f64),
+    offsets: Levels,
+    means: Levels,
     /// How many rows of the log count.
     rows: usize,
     deadline: Deadline,
@@ -166,13 +174,15 @@ impl<'a> Work<'a> {
             }
             Ok(mean)
         };
-        let means = inputs.iter().zip(&record.inputs).map(|(name, signal)| mean(name, signal));
-        let means = (means.collect::<Result<Vec<_>, _>>()?, mean(output, record.output)?);
+        let of_inputs = inputs.iter().zip(&record.inputs).map(|(name, signal)| mean(name, signal));
+        let means =
+            Levels { inputs: of_inputs.collect::<Result<_, _>>()?, output: mean(output, record.output)? };
         let offsets = match options.structure {
-            BlockStructure::Feedback => {
-                (means.0.iter().map(|mean| rounded(*mean)).collect(), rounded(means.1))
-            }
-            _ => (vec![0.0; means.0.len()], 0.0),
+            BlockStructure::Feedback => Levels {
+                inputs: means.inputs.iter().map(|mean| rounded(*mean)).collect(),
+                output: rounded(means.output),
+            },
+            _ => Levels { inputs: vec![0.0; means.inputs.len()], output: 0.0 },
         };
         let deadline = Deadline::after(options.search.time_limit);
         Ok(Self { record, options, offsets, means, rows: COMPARED_ROWS, deadline, monitor })
@@ -192,10 +202,10 @@ impl<'a> Work<'a> {
             for row in rows.clone() {
                 for (index, (signal, delay)) in self.record.inputs.iter().zip(&shape.delays).enumerate() {
                     let late = row.saturating_sub(delay.saturating_sub(1)).max(segment.start);
-                    inputs.push(signal[late] - self.offsets.0[index]);
+                    inputs.push(signal[late] - self.offsets.inputs[index]);
                 }
             }
-            let output = self.record.output[rows].iter().map(|value| value - self.offsets.1).collect();
+            let output = self.record.output[rows].iter().map(|value| value - self.offsets.output).collect();
             runs.push(Run { inputs, output });
         }
         runs
@@ -230,7 +240,7 @@ impl<'a> Work<'a> {
     }
 
     /// A model of this shape, from the best linear approximation on.
-    fn from_linear(&self, shape: &Shape) -> Result<Option<Trained>, Error> {
+    fn started(&self, shape: &Shape) -> Result<Option<Trained>, Error> {
         let Some(linear) = Linear::found(self.record, &self.means, (shape.order, &shape.delays), self.rows)?
         else {
             return Ok(None);
@@ -274,13 +284,13 @@ impl<'a> Work<'a> {
             size,
             is_general: false,
         };
-        let mut best = self.from_linear(&shape(middle, &delays))?;
+        let mut best = self.started(&shape(middle, &delays))?;
         let is_open = self.options.delays.is_none();
         for input in (0..inputs).filter(|_| is_open) {
             for delay in DELAYS {
                 let mut delays = best.as_ref().map_or(&delays, |best| &best.shape.delays).clone();
                 delays[input] = delay;
-                best = better(best, self.from_linear(&shape(middle, &delays))?);
+                best = better(best, self.started(&shape(middle, &delays))?);
             }
         }
         let best = self.nearer(best, is_open)?.map(|best| self.refined(best, is_open)).transpose()?;
@@ -288,7 +298,7 @@ impl<'a> Work<'a> {
         for order in (first..=last).filter(|order| *order != middle) {
             let Some(own) = all.first() else { break };
             let shape = Shape { order, size: own.shape.size, ..shape(order, &own.shape.delays) };
-            let other = self.nearer(self.from_linear(&shape)?, is_open)?;
+            let other = self.nearer(self.started(&shape)?, is_open)?;
             all.extend(other.map(|other| self.refined(other, is_open)).transpose()?);
         }
         // What the log leaves open is no choice, unless nothing else is there.
@@ -309,7 +319,7 @@ impl<'a> Work<'a> {
     fn refined(&self, from: Trained, is_open: bool) -> Result<Trained, Error> {
         let mut best = from;
         if best.shape.structure == BlockStructure::Feedback {
-            let general = self.from_linear(&Shape { is_general: true, ..best.shape.clone() })?;
+            let general = self.started(&Shape { is_general: true, ..best.shape.clone() })?;
             return Ok(general.filter(|general| general.cost < best.cost * (1.0 - SLIGHT)).unwrap_or(best));
         }
         if let (CurveForm::Lines(_), BlockStructure::Wiener | BlockStructure::WienerHammerstein) =
@@ -351,7 +361,7 @@ impl<'a> Work<'a> {
                         break;
                     };
                     shape.delays[input] = next;
-                    let other = self.from_linear(&shape)?;
+                    let other = self.started(&shape)?;
                     if !other.as_ref().is_some_and(|other| is_better(other, own)) {
                         break;
                     }

@@ -1,5 +1,8 @@
 //! The best linear approximation of a log.
 
+use std::ops::Range;
+
+use super::Levels;
 use crate::Error;
 use crate::data::Record;
 use crate::estimate::{Estimate, Initial, Method, estimate};
@@ -19,15 +22,15 @@ impl Linear {
     /// there is none.
     pub(super) fn found(
         record: &Record<'_>,
-        (inputs, output): &(Vec<f64>, f64),
+        means: &Levels,
         (n, delays): (usize, &[usize]),
         most: usize,
     ) -> Result<Option<Self>, Error> {
         let less =
             |signal: &[f64], mean: f64| -> Vec<f64> { signal.iter().map(|value| value - mean).collect() };
-        let y = less(record.output, *output);
+        let y = less(record.output, means.output);
         let u: Vec<Vec<f64>> =
-            record.inputs.iter().zip(inputs).map(|(signal, mean)| less(signal, *mean)).collect();
+            record.inputs.iter().zip(&means.inputs).map(|(signal, mean)| less(signal, *mean)).collect();
         let mut left = most;
         let mut segments = Vec::new();
         for segment in &record.segments {
@@ -35,15 +38,15 @@ impl Linear {
             left -= end - segment.start;
             // Runs of rows in which the output is there.
             let mut start = segment.start;
-            for row in segment.start..=end {
-                if row == end || !y[row].is_finite() {
-                    if row > start {
-                        segments.push(start..row);
-                    }
+            for (row, value) in (segment.start..end).zip(&y[segment.start..end]) {
+                if !value.is_finite() {
+                    segments.push(start..row);
                     start = row + 1;
                 }
             }
+            segments.push(start..end);
         }
+        segments.retain(|rows: &Range<usize>| !rows.is_empty());
         let deviations = Record {
             output: &y,
             inputs: u.iter().map(Vec::as_slice).collect(),

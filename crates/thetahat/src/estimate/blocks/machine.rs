@@ -137,8 +137,7 @@ impl Machine {
                 signals[n + m + index] = curve.evaluate(z[index], numbers, &mut basis).0;
             }
             let y = product(row(n + self.curves.len()), &signals);
-            // Not for NaN either.
-            if !(y.abs() <= limit) {
+            if y.is_nan() || y.abs() > limit {
                 return false;
             }
             seen(at, &signals[..n], &z, y);
@@ -205,7 +204,7 @@ impl Machine {
                 signals[n + m + index] = w;
             }
             let y = combine(n + q, n + q, &signals, &slopes, &mut own);
-            if !(y.abs() <= limit) {
+            if y.is_nan() || y.abs() > limit {
                 return false;
             }
             seen(at, y, &own);

@@ -5,7 +5,7 @@ use thetahat_core::nalgebra::Complex;
 use super::curve::{Curve, knots};
 use super::linear_start::Linear;
 use super::machine::{Machine, Run};
-use super::{BlockStructure, CurveForm, rounded};
+use super::{BlockStructure, CurveForm, Levels, rounded};
 use crate::model::polynomial::roots;
 
 /// What a model in blocks is made of.
@@ -72,13 +72,13 @@ impl Shape {
         &self,
         linear: &Linear,
         runs: &[Run],
-        (means, offsets): (&(Vec<f64>, f64), &(Vec<f64>, f64)),
+        (means, offsets): (&Levels, &Levels),
     ) -> Vec<Start> {
         let (n, m) = (self.order, self.delays.len());
         let u = |input: usize| -> Vec<f64> {
             runs.iter().flat_map(|run| run.inputs.iter().skip(input).step_by(m).copied()).collect()
         };
-        let level = means.1 - offsets.1;
+        let level = means.output - offsets.output;
         let gain = |input: usize| Some(linear.gain(input)).filter(|gain| gain.is_normal()).unwrap_or(1.0);
         match self.structure {
             BlockStructure::Hammerstein => {
@@ -92,7 +92,7 @@ impl Shape {
                 }
                 for (input, curve) in curves.iter().enumerate() {
                     let level = if input == 0 { level } else { 0.0 };
-                    theta.extend(curve.like(|z| gain(input) * (z - means.0[input]) + level));
+                    theta.extend(curve.like(|z| gain(input) * (z - means.inputs[input]) + level));
                 }
                 vec![Start { machine: self.hammerstein(curves), theta }]
             }
@@ -101,13 +101,13 @@ impl Shape {
                 let mut theta = linear.f.clone();
                 theta.extend(linear.b.iter().flatten().map(|b| b / first));
                 theta.extend(self.direct().map(|input| linear.d[input] / first));
-                let rest: f64 = (0..m).map(|input| linear.gain(input) / first * means.0[input]).sum();
+                let rest: f64 = (0..m).map(|input| linear.gain(input) / first * means.inputs[input]).sum();
                 let z = arguments(&self.filter(), &theta, runs);
                 let Some(curves) = z.and_then(|z| self.curves(vec![z])) else { return Vec::new() };
                 theta.extend(curves[0].like(|z| first * (z - rest) + level));
                 vec![Start { machine: self.wiener(curves), theta }]
             }
-            BlockStructure::WienerHammerstein => self.shares(linear, runs, (&means.0, level)),
+            BlockStructure::WienerHammerstein => self.shares(linear, runs, (&means.inputs, level)),
             BlockStructure::Feedback => {
                 let y = runs.iter().flat_map(|run| run.output.iter().copied());
                 let y = y.filter(|value| value.is_finite()).collect();

@@ -54,7 +54,7 @@ fn slopes_are_those_of_the_free_run() {
                 b: vec![vec![0.12, 0.08]; delays.len()],
                 d: vec![0.05; delays.len()],
             };
-            let means = (vec![0.1; delays.len()], 0.2);
+            let means = Levels { inputs: vec![0.1; delays.len()], output: 0.2 };
             let start = shape.starts(&linear, runs, (&means, &means)).pop().unwrap();
             let machine = start.machine;
             let mut theta = start.theta;

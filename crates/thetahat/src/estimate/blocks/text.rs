@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::curve::Curve;
 use super::machine::{Machine, Run};
-use super::{BlockStructure, Trained};
+use super::{BlockStructure, Levels, Trained};
 use crate::model::toml_text;
 
 /// A gain at rest below this part of what its terms are in size is that of a filter that lets nothing through at rest.
@@ -23,7 +23,7 @@ pub(super) fn written(
     trained: &Trained,
     runs: &[Run],
     (inputs, output): (&[String], &str),
-    (offsets, sample_time): ((&[f64], f64), f64),
+    (offsets, sample_time): (&Levels, f64),
 ) -> String {
     let mut trained = trained.clone();
     let fixed = scaled(&mut trained);
@@ -75,7 +75,7 @@ pub(super) fn written(
         let name = own("u", input, m);
         let late = shape.delays[input].saturating_sub(1);
         let name = if late > 0 { format!("{name}(t - {})", late as f64 * sample_time) } else { name };
-        match offsets.0[input] {
+        match offsets.inputs[input] {
             0.0 => name,
             offset => format!("({name} - {offset})"),
         }
@@ -96,7 +96,7 @@ pub(super) fn written(
         let _ = writeln!(text, "x{} = \"{}\"", state + 1, sum(machine, theta, &fixed, state, &signals));
     }
     let seen = sum(machine, theta, &fixed, n + q, &signals);
-    let seen = if offsets.1 == 0.0 { seen } else { format!("{} + {seen}", offsets.1) };
+    let seen = if offsets.output == 0.0 { seen } else { format!("{} + {seen}", offsets.output) };
     let noise = (trained.cost / trained.samples as f64).sqrt().max(1e-9 * size_of(runs)).max(1e-12);
     let channel = toml_text(output);
     let _ = writeln!(text, "\n[outputs]\n{channel} = \"{seen}\"\n");

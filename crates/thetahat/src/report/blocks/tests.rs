@@ -40,7 +40,7 @@ fn fitted(plan: &BlocksPlan, log: &Log) -> Report {
 fn found(report: &Report) -> BTreeMap<String, (f64, f64, Option<String>)> {
     let document = serde_json::to_value(report).unwrap();
     let units = document["estimation"]["unknown"].as_array().unwrap();
-    let each = report.model.parameters().into_iter().zip(units);
+    let each = report.model.parameters().iter().zip(units);
     each.map(|(own, known)| {
         let unit = known["unit"].as_str().map(str::to_owned);
         (own.name.clone(), (own.value, own.standard_error.unwrap_or(f64::NAN), unit))

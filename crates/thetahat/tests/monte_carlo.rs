@@ -4,6 +4,8 @@
 //! `make monte-carlo` does the full numbers. `MONTE_CARLO` is the number of runs of each kind; without it they are
 //! fewer.
 
+#[path = "monte_carlo/blocks.rs"]
+mod blocks;
 #[path = "monte_carlo/design.rs"]
 mod design;
 #[path = "monte_carlo/grey.rs"]

@@ -12,10 +12,10 @@
 //! the last.) The linear systems are in observer form, so that each has one parametrization only; where curves and
 //! systems could share a gain, that of the systems at rest is 1, and the curve is what is measured at rest.
 //!
-//! **Start.** The best linear approximation of the log, an output-error fit, with a straight line for the curve, or none
-//! in the feedback (Schoukens and Tiels 2017, Identification of block-oriented nonlinear systems starting from linear
-//! approximations: a survey, Automatica 85). Between two filters all shares of its poles are tried. From there all
-//! numbers move together, by exact derivatives of the free run.
+//! **Start.** The best linear approximation of the log, an output-error fit, with a straight line for the curve, or
+//! none in the feedback (Schoukens and Tiels 2017, Identification of block-oriented nonlinear systems starting from
+//! linear approximations: a survey, Automatica 85). Between two filters all shares of its poles are tried. From there
+//! all numbers move together, by exact derivatives of the free run.
 //!
 //! **Choice.** Delays, and the numbers of knots and states are those of the least MDL, on the first rows of a long log;
 //! of states there are fewer where that costs next to nothing.
@@ -28,6 +28,8 @@ mod shape;
 #[cfg(test)]
 mod tests;
 mod text;
+
+use std::ops::Range;
 
 use thetahat_numerics::optimize::{Deadline, Monitor, Objective, Search, search};
 
@@ -74,6 +76,8 @@ pub(crate) struct BlocksOptions {
 
 /// Rows that are compared on.
 const COMPARED_ROWS: usize = 20_000;
+/// Runs at most.
+const MOST_RUNS: usize = 100;
 /// Iterations before models are compared.
 const COMPARED_ITERATIONS: usize = 30;
 /// Delays that are tried from far to near.
@@ -190,9 +194,14 @@ impl<'a> Work<'a> {
 
     /// The runs that a model of these delays sees.
     fn runs(&self, shape: &Shape) -> Vec<Run> {
+        // Each has a state of its own to find: of very many the longest do.
+        let mut segments: Vec<&Range<usize>> = self.record.segments.iter().collect();
+        segments.sort_by_key(|segment| std::cmp::Reverse(segment.len()));
+        segments.truncate(MOST_RUNS);
+        segments.sort_by_key(|segment| segment.start);
         let mut left = self.rows;
         let mut runs = Vec::new();
-        for segment in &self.record.segments {
+        for segment in segments {
             let rows = segment.start..segment.end.min(segment.start.saturating_add(left));
             left -= rows.len();
             if rows.is_empty() {

@@ -52,7 +52,8 @@ impl FreeRunErrors<'_> {
     }
 }
 
-/// An eigenvalue of the normal equations, scaled to ones on the diagonal, below which nothing is said about a direction.
+/// An eigenvalue of the normal equations, scaled to ones on the diagonal, below which nothing is said about a
+/// direction.
 const OPEN: f64 = 1e-10;
 
 /// How many values of the output were measured.

@@ -105,7 +105,8 @@ impl Machine {
         matrix
     }
 
-    /// Whether the linear systems are stable, or integrate: no mode grows by more than a part of itself in so many rows.
+    /// Whether the linear systems are stable, or integrate: no mode grows by more than a part of itself in so many
+    /// rows.
     pub(super) fn is_stable(&self, theta: &[f64], rows: usize) -> bool {
         let (n, width, matrix) = (self.states, self.width(), self.matrix(theta));
         let system = DMatrix::from_fn(n, n, |row, column| matrix[row * width + column]);

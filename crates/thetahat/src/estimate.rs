@@ -8,7 +8,8 @@
 //! - [`subspace()`] finds the states of a record with several outputs ([`SubspaceOptions`] with a [`Weighting`]); of
 //!   the [`Subspace`] a [`StateSpace`](crate::model::StateSpace) of any order is read off, and an [`OrderScore`] says
 //!   how well it predicts.
-//! - A [`BlockStructure`] says how linear systems and curves, of a [`CurveForm`], follow one another in a model in blocks.
+//! - A [`BlockStructure`] says how linear systems and curves, of a [`CurveForm`], follow one another in a model in
+//!   blocks.
 //! - Methods have settings: a [`Search`], [`Robust`] (a [`Loss`]), [`ConvexFit`] (a
 //!   [`Norm`], [`Bound`]s and [`GainBound`]s), [`LikelihoodSearch`] for models in equations ([`UnknownParameter`]).
 //!   [`Constant`] says whether the level of the output is estimated too.

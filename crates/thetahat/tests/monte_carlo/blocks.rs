@@ -17,15 +17,15 @@ const B: [f64; 3] = [0.0, 0.05, 0.03];
 
 fn log(seed: u64) -> Log {
     let mut random = Random::new(seed);
-    let mut place = 2;
-    let places: Vec<usize> = (0..BEFORE + 1500)
-        .map(|_| {
-            if random.uniform() < 0.25 {
-                place = ((5.0 * random.uniform()) as usize).min(4);
-            }
-            place
-        })
-        .collect();
+    // Each speed as often as the others, so that the knots are the speeds.
+    let mut places = Vec::new();
+    while places.len() < BEFORE + 1500 {
+        let mut left = vec![0, 1, 2, 3, 4];
+        while !left.is_empty() {
+            let place = left.swap_remove((left.len() as f64 * random.uniform()) as usize);
+            places.extend([place; 4]);
+        }
+    }
     let pumped: Vec<f64> = places.iter().map(|place| PUMPED[*place]).collect();
     let seen = filtered(&B, &A, &pumped).into_iter().map(|y| y + 0.05 * random.normal());
     let seen: Vec<f64> = seen.collect();

@@ -368,7 +368,7 @@ def _bound(name: str, value: Any) -> str:
 
 _WHOLE = frozenset(
     ["channels", "degree", "discard", "half_width", "lags", "length", "max_iterations", "most_terms", "period", "points", "seed"]
-    + ["skip_rows", "starts", "terms", "units", "window"]
+    + ["knots", "skip_rows", "starts", "terms", "units", "window"]
 )
 """The options that are whole numbers."""
 
